@@ -15,6 +15,7 @@ from ..process.machine.free_memory import release_free_memory
 from ..process.machine.linear_algebra import one_thread_each
 from ..results.hdf5.lazy_sequences import LazySequence
 from ..results.results import Results
+from ..solver.assessment.fringe_pressures import FringePressures, compare_with_fringes
 from ..solver.assessment.intervals.statistic_intervals import widen_for_friction
 from ..solver.assessment.penalties import limit_for_few_photographs, penalise_friction
 from ..solver.convex.friction_check import FrictionCheck
@@ -87,7 +88,12 @@ def infer_sequence(
     widened = LazySequence(count, lambda k: _widen_statistics(sequence, statistics[k], assessed[k], check))
     kinematics = _measure_kinematics(sequence)
     return replace(
-        unsolved, frames=assessed, statistics=widened, friction_check=check, read_kinematics=lambda: kinematics
+        unsolved,
+        frames=assessed,
+        statistics=widened,
+        friction_check=check,
+        read_kinematics=lambda: kinematics,
+        fringes=_compare_with_fringes(sequence, assessed),
     )
 
 
@@ -96,6 +102,15 @@ def _measure_kinematics(sequence: CorrectedSequence) -> SequenceKinematics | Non
     tracks = sequence.tracks
     position = np.where(tracks.present[..., None], tracks.position, np.nan)
     return measure_kinematics(position, tracks.rotation, tracks.radius, tracks.sigma, sequence.walls.cell)
+
+
+def _compare_with_fringes(sequence: CorrectedSequence, frames: Sequence[FrameForces]) -> FringePressures | None:
+    """Compare the forces with the fringes of the discs that need to be in equilibrium; None without fringes."""
+    tracks = sequence.tracks
+    if tracks.fringes is None:
+        return None
+    used = tracks.present if tracks.boundary is None else tracks.present & ~tracks.boundary
+    return compare_with_fringes(tracks.fringes, used, frames)
 
 
 def _with_first_frame(

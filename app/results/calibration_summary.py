@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..solver.bodies.grains import Array
+from ..solver.boundary.camera_distortion import TERMS, CameraDistortion
 from ..solver.calibration.calibrate import Calibration
 
 
@@ -47,6 +48,28 @@ def calibration_facts(found: Calibration, walls: tuple[str, ...]) -> dict[str, A
         "wall_gap_rms_before": found.before.wall_spread,
         "wall_gap_rms_after": found.after.wall_spread,
         "noise_factor": found.noise_factor,
+    }
+
+
+def camera_facts(found: CameraDistortion) -> dict[str, Any]:
+    """Return the terms of the camera's distortion over the half-width of the picture, and the errors of radii [m]."""
+    return {
+        "applied": found.applied,
+        "description": found.describe_terms(),
+        "terms": {name: {"value": float(found.value[k]), "sd": float(found.sd[k])} for k, name in enumerate(TERMS)},
+        "gap_scatter_before": found.scatter,
+        "gap_scatter_after": found.explained,
+        "gap_range_unexplained": found.unexplained,
+        "sizes": [
+            {"radius": radius, "error": error, "error_sd": sd, "factor": factor}
+            for radius, error, sd, factor in zip(
+                *(
+                    each.tolist()
+                    for each in (found.size, found.radius_error, found.radius_error_sd, found.radius_factor)
+                ),
+                strict=True,
+            )
+        ],
     }
 
 

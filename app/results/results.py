@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ..solver.assessment.fringe_pressures import FringePressures
 from ..solver.bodies.grains import Array, Grains
 from ..solver.boundary.boundary_correction import Boundary
 from ..solver.boundary.camera_distortion import CameraDistortion
@@ -70,6 +71,7 @@ class Results:
     radius_tuning: RadiusTuning | None = None  # None: not requested
     boundary: Boundary | None = None  # None: used as given
     lens: CameraDistortion | None = None  # None: not sought
+    fringes: FringePressures | None = None  # None: no photoelastic photographs
     base_friction: float = 0.0  # coefficient of the base that was used; 0: none
     read_kinematics: Callable[[], SequenceKinematics | None] = _none  # on every access: it is as long as the tracks
     diagnosis: tuple[Finding, ...] = ()  # causes of wrong forces that the evidence supports

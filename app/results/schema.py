@@ -13,9 +13,10 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
+from ..solver.assessment.fringe_pressures import FringePressures
 from ..solver.bodies.grains import Array, Grains
 from ..solver.boundary.boundary_correction import Boundary
-from ..solver.boundary.camera_distortion import CameraDistortion
+from ..solver.boundary.camera_distortion import TERMS, CameraDistortion
 from ..solver.calibration.calibrate import Calibration
 from ..solver.contacts.radius_tuning import RadiusTuning
 from ..solver.convex.friction_check import FrictionCheck
@@ -51,6 +52,7 @@ PARTS: dict[str, type] = {
     "friction_check": FrictionCheck,
     "radius_tuning": RadiusTuning,
     "kinematics": SequenceKinematics,
+    "fringes": FringePressures,
 }
 PER_FRAME = ("frames", "statistics")  # parts with one object per frame
 GROUP_OF_PART = {"contacts": "contacts", "history": "sweeps"}  # nested parts of a frame: attribute and group
@@ -114,9 +116,8 @@ DIMENSIONS = {
     "distance_bin": Dimension(
         "bins of distances in mean diameters, labelled by their middles", _middles(DISTANCE_EDGES)
     ),
-    "lens_term": Dimension(
-        "terms of the camera's distortion", ("a", "b", "k_1", "k_2", "k_3", "k_4", "p", "q", "c", "d")
-    ),
+    "lens_term": Dimension("terms of the camera's distortion", TERMS),
+    "fringe_knot": Dimension("points of the curve from the fringes to the forces on a disc, ascending"),
     "size_class": Dimension("sizes of the grains, ascending, where their radii have classes"),
     "radius_change": Dimension("tested changes of radius"),
     "friction_trial": Dimension("tested coefficients of friction"),

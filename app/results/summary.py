@@ -19,7 +19,7 @@ from ..solver.frame_forces import ERROR_PARTS, FrameForces, FrameStatus
 from ..solver.statistics.agreement import Agreement
 from ..solver.statistics.frame_statistics import FrameStatistics
 from ..tracks import TrackStatus
-from .calibration_summary import calibration_facts
+from .calibration_summary import calibration_facts, camera_facts
 from .results import Results
 from .truth import accuracy
 
@@ -135,6 +135,7 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "calibration": results.calibration.verdict if results.calibration is not None else None,
         "boundary": results.boundary.describe(results.walls.name) if results.boundary is not None else [],
         "corrections": calibration_facts(results.calibration, results.walls.name) if results.calibration else None,
+        "camera": None if results.lens is None else camera_facts(results.lens),
         "radius_change": results.radius_tuning.found if results.radius_tuning is not None else None,
         "timings": {stage: round(value, 3) for stage, value in seconds.items()},
     }

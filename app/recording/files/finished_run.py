@@ -126,10 +126,11 @@ def write_recording(
     first = photograph(0) if photograph else None
     tracks = tracks_in_cell(results.tracks, results.walls)
     canvas = Canvas.around(tracks, scale, None if first is None else first.shape)
+    camera = "" if results.lens is None else results.lens.describe_terms()
     scene = Scene(
         results.name, tracks, results.walls, results.grains, results.friction, results.configuration, canvas,
         ForceStyle.on(canvas, survey.force_range), truth, options.tolerance, results.radius_tuning,
-        tuple(each.sentence() for each in results.diagnosis), results.kinematics,
+        tuple(each.sentence() for each in results.diagnosis), camera, results.kinematics, results.fringes,
     )  # fmt: skip
     run = _Run(results, survey, scene, photograph, options.active, progress, part_frames)
     parts = [part_of(path, 1 + k) for k in range(max(-(-len(results.frames) // part_frames), 1))]
@@ -176,7 +177,7 @@ def _layout_of(scene: Scene, survey: Survey, frames: int, *, photographs: bool) 
     return RecordingLayout(
         scene.canvas, scene.rod_length, frames, photographs, scene.truth is not None, scene.walls.count,
         scene.radius_tuning is not None, scene.walls.force is not None, survey.has_error_budget, survey.extremes,
-        scene.kinematics is not None,
+        scene.kinematics is not None, scene.fringes is not None,
     )  # fmt: skip
 
 

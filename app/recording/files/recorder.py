@@ -34,8 +34,9 @@ from ..packing_layers.film import FilmWriter
 from ..packing_layers.forces.force_uncertainty import log_force_uncertainty
 from ..packing_layers.forces.network import SweepChoice, chosen_sweeps, log_network
 from ..packing_layers.forces.true_forces import TruthWriter
+from ..packing_layers.grain_maps.fringe_maps import FringeMaps
+from ..packing_layers.grain_maps.kinematic_maps import KinematicMaps
 from ..packing_layers.grains_and_walls import log_grains_and_walls
-from ..packing_layers.kinematic_maps import KinematicMaps
 from ..packing_layers.legends import log_legends
 from ..packing_layers.photograph import log_photograph
 from ..packing_layers.residual_maps import log_residual_maps
@@ -89,7 +90,7 @@ class Recorder:
         self._scene: Scene | None = None
         self._truth: TruthWriter | None = None
         self._film: FilmWriter | None = None
-        self._kinematics: KinematicMaps | None = None
+        self._grain_maps: list[KinematicMaps | FringeMaps] = []
         self._plot: ResidualPlot | None = None
         self._previous: FrameForces | None = None
         self._density = ForceDensity()
@@ -111,7 +112,9 @@ class Recorder:
         self._film = FilmWriter(scene)
         self._plot = ResidualPlot(scene.tolerance)
         if scene.kinematics is not None:
-            self._kinematics = KinematicMaps(scene, scene.kinematics)
+            self._grain_maps.append(KinematicMaps(scene, scene.kinematics))
+        if scene.fringes is not None and scene.tracks.fringes is not None:
+            self._grain_maps.append(FringeMaps(scene, scene.fringes, scene.tracks.fringes))
         if scene.truth is not None:
             self._truth = TruthWriter(scene, scene.truth)
         self._begin(self._stream)
@@ -142,8 +145,8 @@ class Recorder:
             log_radius_curve(stream, scene.radius_tuning)
         if self._film is not None:
             self._film.log_keys(stream)
-        if self._kinematics is not None:
-            self._kinematics.log_styles(stream)
+        for each in self._grain_maps:
+            each.log_styles(stream)
         if self._truth is not None:
             self._truth.log_axes(stream)
 
@@ -178,8 +181,8 @@ class Recorder:
         log_rods(clock, scene, drawn)
         if self._film is not None:
             self._film.log(clock, drawn)
-        if self._kinematics is not None:
-            self._kinematics.log(clock)
+        for each in self._grain_maps:
+            each.log(clock)
         agreement = self._truth.log(clock, forces) if self._truth else None
         self._previous = forces
         self._clipped += scene.style.clipped(forces.fn)

@@ -131,6 +131,16 @@ FLUCTUATIONS = "/kinematics/fluctuation"
 PARTICIPATION = "/kinematics/participation"
 SOLID_FRACTION = "/kinematics/solid_fraction"
 
+BY_FRINGES, BY_FORCES, FRINGE_RESIDUAL = "measured", "inferred", "residual"  # maps of photoelastic discs
+FRINGE_MAPS = "/fringes/map"
+FRINGE_LEGENDS = "/legend/fringes"
+FRINGE_CORRELATION = "/fringes/correlation"
+FRINGES_OF_FRAME = "/fringes/plot/frame"
+FRINGES_OF_ALL = "/fringes/plot/all"
+FRINGE_CURVE = "/fringes/plot/curve"
+FRINGE_AXES = "/fringes/plot/axes"
+FRINGE_TICKS = "/fringes/plot/axes/ticks"
+
 RODS = "/rods/bodies"
 ROD_CHAINS = "/rods/chains"
 ROD_CAPTION = "/rods/caption"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...results.results import TruthContacts
+from ...solver.assessment.fringe_pressures import FringePressures
 from ...solver.bodies.cell import Cell
 from ...solver.bodies.grains import Array, Grains
 from ...solver.bodies.walls import Walls
@@ -39,7 +40,9 @@ class Scene:
     tolerance: float | None = None  # stopping level of the residual
     radius_tuning: RadiusTuning | None = None
     diagnosis: tuple[str, ...] = ()  # sentences
+    camera: str = ""  # its distortion with intervals, a sentence; empty: not sought
     kinematics: SequenceKinematics | None = None
+    fringes: FringePressures | None = None  # beside photoelastic photographs
 
     @property
     def rod_length(self) -> float:

@@ -24,6 +24,7 @@ property `outcome` its results, and `settings` the configuration as TOML: in a c
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 
@@ -63,6 +64,7 @@ class Condition(Enum):
     BUDGET = "where an error budget was requested"
     CELL = "of a periodic cell"
     KINEMATICS = "where the kinematics were measured"
+    FRINGES = "with photoelastic photographs"
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,8 +105,23 @@ _KINEMATIC_MAPS = (
 )
 
 
+_FRINGE_MAPS = (
+    (entities.BY_FRINGES, "discs, colour by the sum of the normal forces that their fringes show"),
+    (entities.BY_FORCES, "discs, colour by the sum of the inferred normal forces"),
+    (entities.FRINGE_RESIDUAL, "discs, colour by the sum by the fringes minus that of the forces"),
+)
+
+
 def _scalar(path: str, meaning: str, when: When = When.END, condition: Condition = Condition.ALWAYS) -> Entity:
     return Entity(path, meaning, _SCALAR | _LINE, when, condition)
+
+
+def _maps(paths: str, legends: str, maps: tuple[tuple[str, str], ...], condition: Condition) -> Iterator[Entity]:
+    """Yield maps of the grains with their legends."""
+    for name, meaning in maps:
+        yield Entity(f"{paths}/{name}", meaning, _POINTS, When.START, condition)
+        yield Entity(f"{legends}/{name}", "its colours", _STRIPS, When.STATIC, condition)
+        yield Entity(f"{legends}/{name}/ticks", "their values", _TICKS, When.STATIC, condition)
 
 
 SCHEMA: tuple[Entity, ...] = (
@@ -269,21 +286,22 @@ SCHEMA: tuple[Entity, ...] = (
     Entity(entities.RADIUS_FOUND, "the change that was applied", _POINTS, When.STATIC, Condition.RADII),
     Entity(entities.RADIUS_AXES, "axes and the target coordination number", _STRIPS, When.STATIC, Condition.RADII),
     Entity(entities.RADIUS_TICKS, "their values", _TICKS, When.STATIC, Condition.RADII),
-    *(
-        Entity(f"{entities.KINEMATIC_MAPS}/{name}", meaning, _POINTS, When.START, Condition.KINEMATICS)
-        for name, meaning in _KINEMATIC_MAPS
-    ),
-    *(
-        Entity(f"{entities.KINEMATIC_LEGENDS}/{name}{part}", text, content, When.STATIC, Condition.KINEMATICS)
-        for name, _ in _KINEMATIC_MAPS
-        for part, text, content in (("", "its colours", _STRIPS), ("/ticks", "their values", _TICKS))
-    ),
+    *_maps(entities.KINEMATIC_MAPS, entities.KINEMATIC_LEGENDS, _KINEMATIC_MAPS, Condition.KINEMATICS),
     Entity(
         entities.FLUCTUATIONS, "fluctuations about the mean field, another colour in a shear band",
         _of("Arrows2D", "origins", "vectors", "radii", "colors", "draw_order"), When.START, Condition.KINEMATICS,
     ),
     _scalar(entities.PARTICIPATION, "participation ratio of the local shear", When.END, Condition.KINEMATICS),
     _scalar(entities.SOLID_FRACTION, "mean local solid fraction", When.END, Condition.KINEMATICS),
+    *_maps(entities.FRINGE_MAPS, entities.FRINGE_LEGENDS, _FRINGE_MAPS, Condition.FRINGES),
+    Entity(entities.FRINGES_OF_FRAME, "sum of the inferred normal forces on a disc over its G²", _POINTS, When.END,
+           Condition.FRINGES),
+    Entity(entities.FRINGES_OF_ALL, "the same of discs of all frames", _POINTS, When.STATIC, Condition.FRINGES),
+    Entity(entities.FRINGE_CURVE, "the curve of the run", _STRIPS, When.STATIC, Condition.FRINGES),
+    Entity(entities.FRINGE_AXES, "axes", _STRIPS, When.STATIC, Condition.FRINGES),
+    Entity(entities.FRINGE_TICKS, "their values", _TICKS, When.STATIC, Condition.FRINGES),
+    _scalar(entities.FRINGE_CORRELATION, "correlation of the sums by fringes and by forces over the discs", When.END,
+            Condition.FRINGES),
     Entity(
         entities.RODS, "rods as cylinders [m]",
         _of("Cylinders3D", "lengths", "radii", "centers", "colors", "fill_mode"), When.END,

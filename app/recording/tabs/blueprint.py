@@ -13,6 +13,7 @@ from ..look import entities
 from ..look.axes import PLOT_BOUNDS
 from ..look.canvas import Canvas
 from ..packing_layers.film import COLUMNS, SWEEP_COLUMNS, film_bounds
+from ..packing_layers.grain_maps.fringe_maps import FRINGE_BOUNDS
 from .axis_ranges import Extremes
 from .views import (
     contacts_by,
@@ -37,6 +38,10 @@ class Tab(StrEnum):
     STATISTICS = "Statistics"
     KINEMATICS = "Kinematics"
     TRUTH = "Truth"
+    FRINGES = "Fringes"  # behind the forces
+
+
+BEHIND = {Tab.FRINGES: Tab.FORCES}  # tabs that share the place of another one
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +59,7 @@ class RecordingLayout:
     budget: bool = False  # error budget
     extremes: Extremes = field(default_factory=dict)  # of the curves known before the recording is written
     kinematics: bool = False  # measured
+    fringes: bool = False  # of photoelastic discs
 
 
 _PACKING = [entities.WALLS, entities.CELL, f"{entities.GRAINS}/**"]
@@ -90,7 +96,7 @@ def make_blueprint(layout: RecordingLayout, *, active: Tab | None = None, follow
     """
     tabs: dict[Tab, rrb.Container] = {
         Tab.SUMMARY: _summary(layout),
-        Tab.FORCES: _forces(layout),
+        Tab.FORCES: _forces_and_fringes(layout, active) if layout.fringes else _forces(layout),
         Tab.CONVERGENCE: _convergence(layout),
         Tab.CONTACTS: _contacts(layout),
         Tab.STATISTICS: _statistics(layout),
@@ -101,10 +107,11 @@ def make_blueprint(layout: RecordingLayout, *, active: Tab | None = None, follow
         tabs[Tab.TRUTH] = _truth(layout)
     if active is None:
         active = Tab.FORCES if following else Tab.SUMMARY
-    if active not in tabs:
+    if active not in tabs and not (active is Tab.FRINGES and layout.fringes):
         raise ValueError(f"there is no tab {active} in this recording")
+    in_front = list(tabs).index(BEHIND.get(active, active))
     return rrb.Blueprint(
-        rrb.Tabs(*tabs.values(), active_tab=list(tabs).index(active), name=entities.ROOT_CONTAINER),
+        rrb.Tabs(*tabs.values(), active_tab=in_front, name=entities.ROOT_CONTAINER),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(
@@ -133,7 +140,7 @@ def _summary(layout: RecordingLayout) -> rrb.Container:
     )  # fmt: skip
 
 
-def _forces(layout: RecordingLayout) -> rrb.Container:
+def _forces(layout: RecordingLayout, name: str = Tab.FORCES) -> rrb.Container:
     photograph = [entities.PHOTOGRAPH] if layout.photographs else []
     angles = [entities.FRICTION_ANGLE, entities.WALL_RATIO_ANGLE]
     curves = rrb.Horizontal(
@@ -152,8 +159,36 @@ def _forces(layout: RecordingLayout) -> rrb.Container:
         ),
         rrb.Vertical(*rows, row_shares=[1.9, 1.0, 1.9, 2.0, 0.55][: len(rows)]),
         column_shares=[1.25, 1.0],
-        name=Tab.FORCES,
+        name=name,
     )
+
+
+def _forces_and_fringes(layout: RecordingLayout, active: Tab | None) -> rrb.Container:
+    inside = _forces(layout, name="Forces and walls")
+    return rrb.Tabs(inside, _fringes(layout), active_tab=int(active is Tab.FRINGES), name=Tab.FORCES)
+
+
+def _fringes(layout: RecordingLayout) -> rrb.Container:
+    """Return maps of the discs by their fringes and by the forces, and how both agree."""
+    views = [
+        packing_view(name, layout.canvas, [entities.WALLS, f"{entities.FRINGE_MAPS}/{quantity}",
+                                           f"{entities.FRINGE_LEGENDS}/{quantity}/**"])
+        for quantity, name in (
+            (entities.BY_FRINGES, "Σ f_n on a disc by its fringes"),
+            (entities.BY_FORCES, "Σ f_n on a disc by the forces"),
+            (entities.FRINGE_RESIDUAL, "Fringes − forces"),
+        )
+    ]  # fmt: skip
+    return rrb.Vertical(
+        rrb.Horizontal(*views),
+        rrb.Horizontal(
+            drawn_view("Forces on a disc over its fringes", "/fringes/plot", *FRINGE_BOUNDS),
+            curve_view("Correlation of fringes and forces", [entities.FRINGE_CORRELATION, entities.TRUST],
+                       y_range=_UNIT_RANGE, corner=_LOW),
+        ),
+        row_shares=[2.0, 1.0],
+        name=Tab.FRINGES,
+    )  # fmt: skip
 
 
 def _convergence(layout: RecordingLayout) -> rrb.Container:

@@ -89,6 +89,7 @@ def write_summary(scene: Scene, frames: list[FrameSummary], clipped: int, total:
             _diagnosis(scene),
             _trust(frames),
             _trust_penalties(frames),
+            _camera(scene),
             _accuracy(frames),
             "\n".join(f"- {note}" for note in notes),
             _legend(scene, clipped, total),
@@ -146,6 +147,14 @@ def _diagnosis(scene: Scene) -> str:
     if not scene.diagnosis:
         return ""
     return "\n".join(["## Something is wrong", "", *(f"- {printable(each)}" for each in scene.diagnosis)])
+
+
+def _camera(scene: Scene) -> str:
+    """Return what the gaps of near grains show of the camera and of the radii; empty where this was not sought."""
+    if not scene.camera:
+        return ""
+    found = scene.camera
+    return f"## Camera and radii\n\n{found[0].upper()}{found[1:]}. (One standard error; see `lens` in results.h5.)"
 
 
 def _trust_penalties(frames: list[FrameSummary]) -> str:

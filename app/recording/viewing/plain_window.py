@@ -37,6 +37,8 @@ def without_panels(blueprint: Blueprint) -> Blueprint:
             others = [each for each in contents_of(container) if each != front]
             blueprint[root]["ContainerBlueprint"]["contents"] += others
             container["contents"] = [front]
+            if path_of(front).startswith("/container/"):  # a view alone has a title, which needs no row of tabs
+                container["container_kind"] = "Vertical"
     return blueprint
 
 
@@ -78,9 +80,9 @@ def _view_boxes(blueprint: Blueprint, item: str, box: Box) -> Iterator[Box]:
         yield from _view_boxes(blueprint, child, inner)
 
 
-def _edges(shares: list[float] | None, count: int) -> np.ndarray:
+def _edges(shares: list[float] | float | None, count: int) -> np.ndarray:
     """Return the edges (count + 1,) of parts with these shares, from 0 to 1; equal ones where none are given."""
-    given = np.array(shares if shares is not None and len(shares) == count else [1.0] * count, np.float64)
+    given = np.ones(count) if shares is None or np.size(shares) != count else np.atleast_1d(np.float64(shares))
     return np.concatenate([[0.0], np.cumsum(given)]) / given.sum()
 
 

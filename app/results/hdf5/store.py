@@ -102,6 +102,7 @@ def load_results(file: Path) -> Results:
             calibration=stored.part("calibration"),
             boundary=stored.part("boundary"),
             lens=stored.part("lens"),
+            fringes=stored.part("fringes"),
             friction_check=stored.part("friction_check"),
             radius_tuning=stored.part("radius_tuning"),
             read_kinematics=stored.deferred("kinematics"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...experiment.units import Scale
 from ...reviewing.rounding import rounded
@@ -52,8 +53,9 @@ def grain_motion(data: RunData, photograph: int, since: int | None, scale: Scale
     dict
         One value per rod that is seen, in the order of `list_rods`: displacement and its departure from the mean
         deformation [px, y down], rotation [°] (over the window of the results: against the local field), shear strain
-        and volume strain [%], √D²min over the mean diameter [%], pressure [kPa], contacts that bear force. None where
-        it is unknown. pixel: [m], at the middle. window: photographs of the window of the results; None: measured here.
+        and volume strain [%], √D²min over the mean diameter [%], pressure [kPa], contacts that bear force, sums of
+        the normal forces by fringes and by forces. None where it is unknown. pixel: [m], at the middle. window:
+        photographs of the window of the results; None: measured here.
 
     Notes
     -----
@@ -82,8 +84,18 @@ def grain_motion(data: RunData, photograph: int, since: int | None, scale: Scale
         "shear": rounded(PERCENT * values.shear[here]),
         "volume": rounded(PERCENT * values.volume[here]),
         "d2min": rounded(PERCENT * np.sqrt(values.d2min[here]) / (2.0 * tracks.radius.mean())),
+        "fringes": _fringes(data, frame, here),
         "pressure": rounded(1e-3 * pressure[here]), "coordination": rounded(coordination[here]),
     }  # fmt: skip
+
+
+def _fringes(data: RunData, frame: int, here: NDArray[np.intp]) -> dict[str, Any] | None:
+    """Sums of the normal forces on the discs by fringes and by forces, over the mean; None without fringes."""
+    found = None if data.results is None else data.results.fringes
+    if found is None:
+        return None
+    sums = {"measured": found.measured, "inferred": found.inferred, "residual": found.residual}
+    return {name: rounded(values[frame, here] / found.mean) for name, values in sums.items()}
 
 
 def _stored(kinematics: SequenceKinematics, frame: int) -> _Values:

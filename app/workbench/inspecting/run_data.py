@@ -173,6 +173,8 @@ def frame_summaries(data: RunData) -> dict[str, Any]:
         **{name: before + rounded([getattr(each, name) for each in summaries]) for name in NUMBERS},
         "lost": before + lost.tolist(), "suspect_poses": before + suspect.tolist(),
         "time": before + tracks.time[:count].tolist(),
+        "camera": "" if data.results is None or data.results.lens is None else data.results.lens.describe_terms(),
+        "fringes": data.results is not None and data.results.fringes is not None,
         "diagnosis": [] if data.results is None else [each.sentence() for each in data.results.diagnosis],
     }  # fmt: skip
 

@@ -14,7 +14,7 @@ from rodsight.results.results import Results, TruthContacts
 from rodsight.solver.kinematics.sequence_kinematics import measure_kinematics
 
 from tests.app.recording.fake_photographs import PIXEL, SHAPE, photograph
-from tests.app.recording.fake_results import make_results, make_truth, make_tuning
+from tests.app.recording.fake_results import make_results, make_truth, make_tuning, with_fringes
 
 LOST = (20, 2)  # grain and the frame it is lost from
 
@@ -50,5 +50,10 @@ def recording(results, truth, tmp_path_factory) -> RecordingFile:
         frames=[replace(each, error_budget=fraction) for each in results.frames],
     )  # fmt: skip
     return write_recording(
-        tuned, path, photograph=photograph, scale=scale, truth=truth, options=RecordingOptions(tolerance=1e-4)
+        with_fringes(tuned),
+        path,
+        photograph=photograph,
+        scale=scale,
+        truth=truth,
+        options=RecordingOptions(tolerance=1e-4),
     )

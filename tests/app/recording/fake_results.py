@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 import numpy as np
 from rodsight.results.results import Results, TruthContacts
 from rodsight.solver.assessment.changes import find_changes
+from rodsight.solver.assessment.fringe_pressures import compare_with_fringes
 from rodsight.solver.bodies.grains import Grains
 from rodsight.solver.bodies.walls import Walls
 from rodsight.solver.contacts.contacts import Contacts, ContactState, detect_contacts
@@ -15,7 +16,7 @@ from rodsight.solver.frame_forces import FrameForces, FrameStatus
 from rodsight.solver.nlgs.force_memory import ForceMemory
 from rodsight.solver.nlgs.start_residuals import COLD_SWEEPS
 from rodsight.solver.nlgs.sweep_record import SweepHistory
-from rodsight.solver.statistics.balance import grain_unbalance
+from rodsight.solver.statistics.balance import grain_unbalance, sum_on_grains
 from rodsight.solver.statistics.force_statistics import FORCE_BINS, MOBILISATION_BINS
 from rodsight.solver.statistics.frame_statistics import FrameStatistics
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
@@ -68,6 +69,15 @@ def make_tuning() -> RadiusTuning:
     change = np.linspace(-1e-4, 1e-4, 21)
     number = 3.5 + 0.4 * np.tanh((change - 1.2e-5) / 4e-5)
     return RadiusTuning(change, number, number[:, None], 3.5, 1.2e-5, 3.5)
+
+
+def with_fringes(results: Results) -> Results:
+    """Return the results with fringes that grow with the root of the forces on a disc."""
+    fringes = np.zeros((results.tracks.frame_count, results.tracks.grain_count))
+    for k, forces in enumerate(results.frames):
+        fringes[k] = np.sqrt(sum_on_grains(forces.contacts, forces.fn)[: results.tracks.grain_count])
+    found = compare_with_fringes(fringes, results.tracks.present, results.frames)
+    return replace(results, tracks=replace(results.tracks, fringes=fringes), fringes=found)
 
 
 def make_truth(results: Results, rng: np.random.Generator) -> TruthContacts:

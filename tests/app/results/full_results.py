@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from rodsight.results.results import Results
+from rodsight.solver.assessment.fringe_pressures import FringePressures
 from rodsight.solver.assessment.intervals.statistic_intervals import CONSTANT
 from rodsight.solver.bodies.wall_shapes import OUT, STRAIGHT
 from rodsight.solver.boundary.bars import Bars
@@ -74,6 +75,12 @@ def make_full_results(frame_count: int = 3, seed: int = 3, **options) -> Results
         radius_tuning=tuning,
         boundary=_boundary(f, w, np.random.default_rng(seed + 1)),
         lens=_lens(np.random.default_rng(seed + 3)),
+        fringes=FringePressures(
+            *np.random.default_rng(seed + 4).random((2, f, n)),
+            np.linspace(0.2, 0.9, f),
+            np.arange(3.0),
+            np.arange(3.0) ** 2,
+        ),
         read_kinematics=lambda: _kinematics(f, n, np.random.default_rng(seed + 2)),
         ensemble_size=2,
     )

@@ -67,6 +67,7 @@ def test_memory_is_independent_of_the_number_of_frames(tmp_path, monkeypatch):
         plain = {
             "boundary": None,
             "calibration": None,
+            "fringes": None,
             "friction_check": None,
             "radius_tuning": None,
             "read_kinematics": lambda: None,

@@ -123,6 +123,7 @@ def test_a_file_of_schema_2_keeps_its_values(file):
         statistics=statistics,
         boundary=None,
         lens=None,
+        fringes=None,
         read_kinematics=lambda: None,
         walls=walls,
         tracks=tracks,

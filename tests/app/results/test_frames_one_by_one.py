@@ -44,6 +44,7 @@ def full():
         read_kinematics=lambda: None,
         friction_check=None,
         calibration=None,
+        fringes=None,
     )
 
 

@@ -22,6 +22,7 @@ from rodsight.verdicts.log import VERDICTS, VerdictLog
 from rodsight.workbench.inspecting.run_data import run_stamp
 from rodsight.workbench.service.workbench import Workbench
 
+from tests.app.recording.fake_results import with_fringes
 from tests.app.workbench.conftest import Visitor
 from tests.golden.stored import unpack
 
@@ -372,6 +373,20 @@ def test_the_motion_over_the_window_is_that_of_the_results(solved):
     np.testing.assert_allclose(np.array(answer["rotation"], float), turned, rtol=1e-3, atol=1e-6)
     moved = np.column_stack([answer["fx"], -np.array(answer["fy"], float)]).astype(float) * answer["pixel"]
     np.testing.assert_allclose(moved, measured.fluctuation[-1, here], rtol=0.02, atol=2e-6)
+
+
+def test_fringes_are_values_of_the_discs_where_the_run_has_them(solved):
+    visitor, at, results, folder = solved
+    last = FIRST + len(results.frames) - 1
+    assert visitor.request("run_state", at=at)["frames"]["fringes"] is False
+    assert visitor.request("motion", at=at, frame=last)["fringes"] is None
+    fringed = with_fringes(results)
+    save_results(folder / RESULTS, fringed, origin_of(folder / RESULTS))
+    assert visitor.request("run_state", at=at)["frames"]["fringes"] is True
+    answer = visitor.request("motion", at=at, frame=last)["fringes"]
+    here, found = results.tracks.present[-1], fringed.fringes
+    for name, values in (("measured", found.measured), ("inferred", found.inferred), ("residual", found.residual)):
+        np.testing.assert_allclose(np.array(answer[name], float), values[-1, here] / found.mean, rtol=2e-3, atol=1e-4)
 
 
 def test_candidate_pairs_are_those_of_their_photograph(solved):

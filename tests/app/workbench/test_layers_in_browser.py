@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
-from rodsight.results.hdf5.store import load_results
+from rodsight.results.hdf5.store import load_results, origin_of, save_results
 
+from tests.app.recording.fake_results import with_fringes
 from tests.app.workbench.hand import go, idle, on_screen, opened
 from tests.browser import read_picture
 
@@ -198,3 +199,32 @@ def test_the_mask_is_a_layer_of_the_photographs(tab: Page):
     tab.wait_for_function("workbench.stage.image !== null")
     masked, whole = shown(tab, photograph=True, mask=True), shown(tab, photograph=True)
     assert masked.astype(float).sum() < 0.8 * whole.astype(float).sum()
+
+
+def test_values_by_fringes_are_offered_and_drawn_only_where_the_run_has_them(tab: Page, solved: Path):
+    """The choice of another run, which this one lacks, shows the shear strain."""
+    fringed = {"by": "fringes", "since": "first"}
+    assert drawn(shown(tab, strain=fringed)) > 0.002
+    open_details(tab, "strain")
+    expect(tab.locator("#layer-strain-by option[value=fringes]")).to_have_count(0)
+    file = solved / "runs" / "mine" / "results.h5"
+    save_results(file, with_fringes(load_results(file)), origin_of(file))
+    tab.reload()
+    idle(tab)
+    go(tab, "inspect")
+    tab.evaluate(f"workbench.show({FRAME})")
+    idle(tab)
+    tab.wait_for_function("workbench.step.isLoaded(workbench)")
+    tab.evaluate(f"workbench.stage.fit({BOX})")
+    by_fringes, by_forces = (shown(tab, strain={**fringed, "by": name}) for name in ("fringes", "residual"))
+    assert drawn(by_fringes) > 0.002
+    assert not np.array_equal(by_fringes, by_forces)
+    open_details(tab, "strain")
+    expect(tab.locator("#layer-strain-by option[value=fringes]")).to_have_count(1)
+
+
+def open_details(tab: Page, layer: str) -> None:
+    """Open the list of layers and the row of one of them."""
+    if not tab.locator("#layers-panel").is_visible():
+        tab.locator("#layers-button").click()
+    tab.evaluate(f"document.querySelector('#layers-panel details[data-layer={layer}]').open = true")

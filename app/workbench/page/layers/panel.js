@@ -52,7 +52,7 @@ function row(app, name) {
 
 function details(app, name) {
   const layer = layers[name], set = (values) => { setLayer(name, values); changed(app); };
-  const choices = Object.entries(CHOICES[name] ?? {}).map(([key, [words, options]]) => select(`${name}-${key}`, words, options, layer[key], (value) => set({ [key]: value, ...(key === "by" ? { map: null, low: null, high: null } : {}) })));
+  const choices = Object.entries(CHOICES[name] ?? {}).map(([key, [words, options]]) => select(`${name}-${key}`, words, key === "by" && name === "strain" ? available(app, options) : options, layer[key], (value) => set({ [key]: value, ...(key === "by" ? { map: null, low: null, high: null } : {}) })));
   if (name === "photograph") return [
     LIGHT.map(([key, min, max, step]) => h("label", { class: "slider" }, h("span", {}, key), h("input", { type: "range", id: `layer-${key}`, min, max, step, value: layer[key], oninput: (event) => { setLayer(name, { [key]: Number(event.target.value) }); app.stage.request(); } }))),
     h("button", { id: "layer-stretch", title: "the darkest and the brightest hundredth become black and white", onclick: () => set(app.stage.picture.stretched()) }, "Stretch"),
@@ -63,6 +63,9 @@ function details(app, name) {
     h("div", { class: "range" }, number(app, name, "low", "from", "auto"), number(app, name, "high", "to", "auto")));
   return choices;
 }
+
+/** The values of rods that this run has. */
+const available = (app, options) => Object.fromEntries(Object.entries(options).filter(([value]) => !VALUES[value].needs || app.step.has?.(VALUES[value].needs)));
 
 function select(id, words, options, value, onvalue) {
   return h("label", { class: "choice" }, h("span", {}, words), h("select", { id: `layer-${id}`, onchange: (event) => onvalue(event.target.value) }, Object.entries(options).map(([name, text]) => h("option", { value: name, selected: name === value }, text))));

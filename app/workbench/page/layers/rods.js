@@ -18,7 +18,12 @@ export const VALUES = {
   rotation: { words: "rotation, + counter-clockwise", unit: "°", of: (motion) => motion.rotation, map: "difference", signed: true },
   pressure: { words: "pressure in the rod", unit: "kPa", of: (motion) => motion.pressure, map: "force", zero: true },
   coordination: { words: "contacts that bear force", unit: "", of: (motion) => motion.coordination, map: "probability", low: 0, high: 6 },
+  fringes: { words: "Σ f_n on the disc by its fringes", unit: "× mean", of: (motion) => motion.fringes?.measured, map: "force", zero: true, needs: "fringes" },
+  forces: { words: "Σ f_n on the disc by the forces", unit: "× mean", of: (motion) => motion.fringes?.inferred, map: "force", zero: true, needs: "fringes" },
+  residual: { words: "Σ f_n by fringes − by forces", unit: "× mean", of: (motion) => motion.fringes?.residual, map: "difference", signed: true, needs: "fringes" },
 };
+/** The chosen values of rods; shear strain where the run lacks those that were chosen in another one. */
+const chosenValues = (motion) => (VALUES[layers.strain.by].of(motion) ? VALUES[layers.strain.by] : VALUES.shear);
 
 export const CONTACTS = {
   state: { words: "sticking, sliding, open" },
@@ -50,14 +55,14 @@ export function motionOf(app, facts) {
 export const isLoaded = () => [...known.values()].every((each) => each !== null); // for tests
 
 export function scaleOfValues(motion) {
-  const how = VALUES[layers.strain.by], [low, high] = how.high !== undefined ? [how.low, how.high] : rangeOfValues(how.of(motion), how);
+  const how = chosenValues(motion), [low, high] = how.high !== undefined ? [how.low, how.high] : rangeOfValues(how.of(motion), how);
   return scaleOf("strain", { map: how.map, low, high });
 }
 
 /** Values of rods as discs below everything else. */
 export function drawValues(c, stage, net, motion) {
   if (!motion) return;
-  const scale = scaleOfValues(motion), values = VALUES[layers.strain.by].of(motion), groups = new Map();
+  const scale = scaleOfValues(motion), values = chosenValues(motion).of(motion), groups = new Map();
   net.rods.x.forEach((x, n) => {
     if (values[n] === null || !stage.sees(x, net.rods.y[n], net.rods.r[n])) return;
     addCircle(groups, scale.colour(values[n]), x, net.rods.y[n], net.rods.r[n]);
@@ -107,7 +112,7 @@ const over = (motion) => (motion.frame - motion.since > 1 ? ` over ${motion.fram
 
 export function rodLegends(net, motions) {
   const found = [], strain = motions[layers.strain.since], moved = motions[layers.displacement.since];
-  if (layers.strain.on && strain) { const how = VALUES[layers.strain.by]; found.push({ words: `${how.words}${over(strain)}`, unit: how.unit, scale: scaleOfValues(strain) }); }
+  if (layers.strain.on && strain) { const how = chosenValues(strain); found.push({ words: `${how.words}${how.needs ? "" : over(strain)}`, unit: how.unit, scale: scaleOfValues(strain) }); }
   if (layers.displacement.on && moved) { const scale = scaleOfDisplacement(net, moved); found.push({ words: `${layers.displacement.by === "all" ? "displacement" : "fluctuation"}${over(moved)}, drawn × ${digits(scale.times, 2)}`, unit: "µm", scale }); }
   if (layers.contacts.on && layers.contacts.by !== "state") { const how = CONTACTS[layers.contacts.by]; found.push({ words: `contacts: ${how.words}`, unit: how.unit, scale: scaleOfContacts(net) }); }
   return found;

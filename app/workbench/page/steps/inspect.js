@@ -30,6 +30,7 @@ export const inspect = {
   isLoaded: (app) => net?.frame === app.frame, // for tests
   contactAt: (row) => net.point[row], // for tests
   chosen: () => (chosen?.j === undefined ? null : { i: chosen.i, j: chosen.j }), // for tests
+  has: (name) => Boolean(facts?.[name]),
   moved(app) { recording?.show(Math.max(app.frame - (facts?.first ?? 0), 0)); app.queue(() => load(app)); },
   taken(app) { if (facts) app.queue(async () => { facts = (await request("run_state", { at: app.project.at })).frames; await load(app, true); }); },
   tool: (app) => tool(app),
@@ -43,6 +44,7 @@ export const inspect = {
       net && !recording ? h("div", { class: "row" }, h("button", { id: "save-picture", title: "What is shown, as PNG", onclick: () => savePicture(app, caption(app)) }, "Save picture"), h("button", { id: "save-table", title: "The contacts of this photograph, as CSV", onclick: () => saveTable(app, net) }, "Save table"), h("button", { id: "save-figure", title: "The forces of this photograph as a figure for a paper, SVG", disabled: facts.provisional, onclick: () => saveFigure(app) }, "Save figure")) : null,
       chosen?.j !== undefined ? pairCard(app) : chosen ? rodCard(app) : h("p", {}, facts.reason[app.frame] ?? ""),
       chosen ? null : [list ? h("button", { id: "to-review", onclick: () => app.goTo("review") }, "Review contacts") : null, givenSection(app, (each) => show(app, each))],
+      chosen || !facts.camera ? null : h("p", { id: "camera", class: "hint" }, `Camera and radii: ${facts.camera}.`),
     ];
   },
   draw(app, c, k) {

@@ -47,7 +47,7 @@ def test_a_minimal_recording_contains_the_unconditional_part_of_the_schema(tmp_p
     report = write_recording(make_results(1, sweeps=0, recorded=np.empty(0, int)), tmp_path / "bare.rrd")
     # The only frame is a reset, which is flagged.
     absent = (Condition.PHOTOGRAPHS, Condition.TRUTH, Condition.TOLERANCE, Condition.SWEPT, Condition.RADII)
-    absent += (Condition.WALL_FORCES, Condition.BUDGET, Condition.KINEMATICS)
+    absent += (Condition.WALL_FORCES, Condition.BUDGET, Condition.KINEMATICS, Condition.FRINGES)
     assert written(report.path) == expected(*absent, Condition.CELL)
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.tabs.summary_tab import MAX_REASONS
+from rodsight.solver.boundary.camera_distortion import CameraDistortion
 
 from tests.app.recording.fake_results import make_results
 from tests.app.recording.rows import rows
@@ -46,3 +48,20 @@ def test_the_summary_lists_the_reasons_of_the_least_trusted_frames_only(tmp_path
 
 def test_a_summary_without_reasons_has_no_list(tmp_path):
     assert "Reasons that lower T" not in summary_of(make_results(2, sweeps=2).frames, tmp_path / "run.rrd")
+
+
+def test_the_summary_states_the_camera_with_intervals_where_it_was_sought(tmp_path):
+    results = make_results(2, sweeps=2)
+    value, sd = np.zeros(10), np.full(10, 2e-4)
+    value[0], value[2] = -1.5e-3, 2e-2
+    lens = CameraDistortion(
+        value, sd, 0.0, np.zeros(2), 0.1, 8e-5, 3e-5, True, 0.0, np.array([-2e-6]), 1e-5, np.array([5e-7]),
+        np.array([8e-3]), np.ones(1),
+    )  # fmt: skip
+    write_recording(replace(results, lens=lens), tmp_path / "run.rrd")
+    text = rows(tmp_path / "run.rrd", "/summary")[-1]["TextDocument:text"][0]
+    assert "## Camera and radii" in text
+    assert "a = −0.15 ± 0.02 %, k1 = 2 ± 0.02 % of half the width and scatter by 30 µm, 80 µm before" in text
+    assert "radii of 8 mm by −2 ± 0.5 µm" in text
+    write_recording(results, tmp_path / "plain.rrd")
+    assert "Camera" not in rows(tmp_path / "plain.rrd", "/summary")[-1]["TextDocument:text"][0]

@@ -50,6 +50,8 @@ def test_a_plain_picture_of_a_tab_has_no_menus_and_no_buttons(recording):
         for end in (left, size[0]):
             assert np.ptp(picture[2 : TITLE - 2, end - BUTTONS + 2 : end - 4]) < 12  # buttons in titles are erased
         assert np.ptp(picture[:TITLE, ICON:200]) > 100  # the title itself is there
+        viewer.show_tab("Fringes")  # behind the forces
+        assert warm_fraction(read_picture(viewer.picture())) > 0.05
         viewer.show_tab("Rods in space")  # of a nested row of tabs
         assert warm_fraction(read_picture(viewer.picture())) > 0.005
 

@@ -1,0 +1,1 @@
+"""Maps of the grains, each coloured by one quantity."""
