@@ -82,7 +82,7 @@ def _view_boxes(blueprint: Blueprint, item: str, box: Box) -> Iterator[Box]:
 
 def _edges(shares: list[float] | float | None, count: int) -> np.ndarray:
     """Return the edges (count + 1,) of parts with these shares, from 0 to 1; equal ones where none are given."""
-    given = np.ones(count) if shares is None or np.size(shares) != count else np.atleast_1d(np.float64(shares))
+    given = np.ones(count) if shares is None or np.size(shares) != count else np.array(shares, np.float64, ndmin=1)
     return np.concatenate([[0.0], np.cumsum(given)]) / given.sum()
 
 
