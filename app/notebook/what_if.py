@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,14 +14,16 @@ from ..inference.infer_sequence import infer_sequence
 from ..inference.inputs import Inputs
 from ..inference.solve_frames import InferenceObserver
 from ..process.errors import InputError
+from ..results.hdf5.lazy_sequences import LazySequence
 from ..results.results import Results
 from ..reviewing.judging.candidate_pairs import walls_at
 from ..solver.contacts.contacts import Contacts, measure_contacts
 from ..solver.contacts.pairs import find_rows
 from ..solver.contacts.verdicts import Verdicts
-from ..solver.frame_forces import FrameStatus
-from ..solver.statistics.contact_removal import remove_contact
-from ..solver.statistics.local_change import limit_friction, rebalance
+from ..solver.frame_forces import FrameForces, FrameStatus
+from ..solver.redistribution.contact_removal import remove_contact
+from ..solver.redistribution.local_change import limit_friction, rebalance
+from ..solver.statistics.frame_statistics import FrameStatistics
 from ..solver.statistics.stress import friction_angle, love_weber_stress, wall_forces
 from ..tracks import Tracks
 from ..verdicts.decisions import BodyNames
@@ -29,6 +32,7 @@ from .run import Run
 from .shown_progress import shown_progress
 
 Pairs = Iterable[tuple[int, int | str]]
+T = TypeVar("T")
 
 
 def what_if(
@@ -168,9 +172,10 @@ def _changed_locally(
     friction: float | None,
 ) -> Results:  # fmt: skip
     """Return results with the nearest balanced forces around what changes."""
-    solved, statistics = list(results.frames), list(results.statistics)
+    solved: dict[int, FrameForces] = {}
+    statistics: dict[int, FrameStatistics] = {}
     for k in frames:
-        forces = solved[k]
+        forces = results.frames[k]
         if forces.status is FrameStatus.FAILED:
             continue
         limit = _coefficients(results, k, friction)
@@ -186,13 +191,20 @@ def _changed_locally(
             removal = remove_contact(results.grains, contacts, fn, ft, row, friction=limit)
             fn, ft = removal.fn, removal.ft
         solved[k] = replace(forces, contacts=contacts, fn=fn, ft=ft)
-        before, position = statistics[k], results.tracks.position[k]
+        before, position = results.statistics[k], results.tracks.position[k]
         stress = love_weber_stress(contacts, fn, ft, position, before.area, rod_length(results))
         statistics[k] = replace(
             before, stress=stress, pressure=0.5 * float(np.trace(stress)), friction_angle=friction_angle(stress),
             wall_force=wall_forces(contacts, fn, ft),
         )  # fmt: skip
-    return replace(results, frames=solved, statistics=statistics)
+    return replace(
+        results, frames=_with_items(results.frames, solved), statistics=_with_items(results.statistics, statistics)
+    )
+
+
+def _with_items(before: Sequence[T], changed: Mapping[int, T]) -> Sequence[T]:
+    """Return a sequence with some items changed; the others are read on access, not before."""
+    return LazySequence(len(before), lambda k: changed[k] if k in changed else before[k])
 
 
 def _coefficients(results: Results, frame: int, friction: float | None) -> np.ndarray:

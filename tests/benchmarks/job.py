@@ -14,16 +14,18 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import rodsight
 from rodsight import pipeline
 from rodsight.experiment.experiment import load_experiment
 from rodsight.inference.correction.correct_sequence import correct_sequence
 from rodsight.inference.inference_settings import material_of, settings_of
 from rodsight.inference.inputs import Inputs
 from rodsight.results.results import Results
+from rodsight.solver.bodies.grains import Array
+from rodsight.solver.redistribution.contact_removal import remove_contact
 from rodsight.solver.sequence.frames import solve_sequence
-from rodsight.solver.statistics.contact_removal import remove_contact
 
-from tests.benchmarks.timing import time_once
+from tests.benchmarks.timing import Duration, time_once
 
 REMOVED_CONTACTS = 15  # one at a time
 MAX_RODS_SOLVED_AGAIN = 20_000  # beyond, the frames before it take many minutes
@@ -48,6 +50,7 @@ def run_benchmark_job(folder: Path, out: Path) -> dict[str, object]:
         "peak": peak,
         "megabytes": [round((out / name).stat().st_size / 1e6, 1) for name in ("results.h5", "recording.rrd")],
         "without": without_a_contact(results),
+        "what_if": forbid_a_contact(out),
         "again": solve_again(run) if results.grains.count <= MAX_RODS_SOLVED_AGAIN else [],
     }
 
@@ -63,13 +66,26 @@ def peak_memory() -> float:
 
 def without_a_contact(results: Results) -> list[float]:
     """Median seconds (processor, clock) of the local solution without one of the strong contacts of a frame."""
-    frame = results.frames[results.tracks.frame_count // 2]
-    removed = partial(remove_contact, results.grains, frame.contacts, frame.fn, frame.ft)
-    friction = results.contact_friction(results.tracks.frame_count // 2)
-    durations = [
-        time_once(partial(removed, row, friction=friction))
-        for row in np.argsort(-frame.fn)[: 4 * REMOVED_CONTACTS : 4].tolist()
-    ]
+    k = results.tracks.frame_count // 2
+    frame, friction = results.frames[k], results.contact_friction(k)
+    removed = partial(remove_contact, results.grains, frame.contacts, frame.fn, frame.ft, friction=friction)
+    return _median([time_once(partial(removed, row)) for row in _strong_contacts(frame.fn)])
+
+
+def forbid_a_contact(out: Path) -> list[float]:
+    """Median seconds (processor, clock) of the same in Python, on a stored run."""
+    run = rodsight.open(out)
+    k = run.results.tracks.frame_count // 2
+    pairs = run.contacts(frame=k).query("j >= 0")
+    strong = pairs[["i", "j"]].to_numpy()[_strong_contacts(pairs["fn"].to_numpy())].tolist()
+    return _median([time_once(partial(rodsight.what_if, run, k, forbid=[pair], local=True)) for pair in strong])
+
+
+def _strong_contacts(fn: Array) -> list[int]:
+    return np.argsort(-fn)[: 4 * REMOVED_CONTACTS : 4].tolist()
+
+
+def _median(durations: list[Duration]) -> list[float]:
     return [
         float(np.median([each.processor for each in durations])), float(np.median([each.clock for each in durations]))
     ]  # fmt: skip

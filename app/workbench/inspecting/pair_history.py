@@ -11,7 +11,7 @@ from ...reviewing.judging.candidate_pairs import gap_standard_deviation, walls_a
 from ...reviewing.rounding import rounded, rounded_one
 from ...solver.contacts.contacts import measure_pairs
 from ...solver.contacts.pairs import match_values
-from ...solver.statistics.contact_removal import remove_contact
+from ...solver.redistribution.contact_removal import remove_contact
 from ...verdicts.decisions import BodyNames
 from ...verdicts.log import Body
 

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 import rodsight
 from rodsight.manual.contents import FOLDER
+from rodsight.results.hdf5.reader import StoredFrames
 from rodsight.solver.contacts.contacts import ContactSource
 
 from tests.program import rodsight as command
@@ -107,6 +108,18 @@ def test_a_forbidden_contact_bears_nothing_and_the_input_is_used_again(run):
     near = rodsight.what_if(run, 4, forbid=[strongest], local=True).contacts(4)
     assert near.query(pair)["fn"].item() == 0.0
     assert not np.array_equal(near["fn"], run.contacts(4)["fn"])
+
+
+def test_a_local_change_of_one_frame_reads_no_other(run, monkeypatch):
+    read = []
+    own = StoredFrames._read
+    monkeypatch.setattr(StoredFrames, "_read", lambda frames, k: read.append(k) or own(frames, k))
+    run = rodsight.open(run.file.parent)
+    strongest = run.contacts(4).query("j >= 0").nlargest(1, "fn")[["i", "j"]].to_numpy()[0].tolist()
+    read.clear()
+    near = rodsight.what_if(run, 4, forbid=[strongest], local=True)
+    assert set(read) <= {4}
+    pd.testing.assert_frame_equal(near.contacts(2), run.contacts(2))
 
 
 def test_friction_and_place_are_changed_locally(run):

@@ -14,28 +14,6 @@ MUTANTS = [
         ("resultant_norms(contacts, fn, ft, weight)[present].max", "resultant_norms(contacts, fn, ft, weight).max"),
     ),
     *mutants_of(
-        "solver/statistics/contact_removal.py",
-        STATISTICS,
-        ("matrix[at[body], 2, m, 1] = -grains.radius[body]", "matrix[at[body], 2, m, 1] = grains.radius[body] * sign"),
-        ("= tried_n - fn, tried_t - ft", "= 0.0, 0.0"),
-        ("resultant = matrix @ given.ravel() + removed", "resultant = matrix @ given.ravel()"),
-        ("friction * along if ft >= 0.0 else -friction * along", "friction * along"),
-        ("free[row] = False", "free[row] = True"),
-        ("given, friction[rows], TOLERANCE", "given, friction[: len(rows)], TOLERANCE"),
-        ("fn + friction * abs(ft)) / (1.0 + friction * friction)", "fn + friction * abs(ft)) / (1.0 + friction)"),
-        (
-            "(int(contacts.i[contact]), -1.0), (int(contacts.j[contact]), 1.0)",
-            "(int(contacts.i[contact]), 1.0), (int(contacts.j[contact]), 1.0)",
-        ),
-    ),
-    *mutants_of(
-        "solver/statistics/local_change.py",
-        STATISTICS,
-        ("contacts if moved is None else moved, free", "contacts, free"),
-        ("given, friction[free], TOLERANCE", "given, 2.0 * friction[free], TOLERANCE"),
-        ("np.abs(ft[row]) - friction[row] * fn[row] > enough", "np.abs(ft[row]) > enough"),
-    ),
-    *mutants_of(
         "solver/statistics/stress.py",
         STATISTICS,
         ("/ (area * length)", "/ area"),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..bodies.grains import Array, Grains
 from ..contacts.contacts import Contacts
-from .contact_removal import TOLERANCE, neighbourhood, project_forces, resultants
+from .nearest_forces import nearest_forces, neighbourhood, resultants
 
 WITHIN = 1e-3  # of the mean normal force: a friction force that is so little beyond the cone is within it
 
@@ -66,11 +66,10 @@ def rebalance(
     """
     touching, members = neighbourhood(grains, contacts, rows, reach)
     free = np.flatnonzero(touching)
-    given = np.stack([fn[free], ft[free]], axis=1)
-    carried = resultants(grains, contacts, free, members) @ given.ravel()
+    given = np.concatenate([fn[free], ft[free]])
+    carried = resultants(grains, contacts, free, members) @ given
     matrix = resultants(grains, contacts if moved is None else moved, free, members)
     scale = max(float(np.mean(np.abs(fn))), 1e-300)
-    changed = project_forces(matrix, carried, given, friction[free], TOLERANCE * scale)
     new_fn, new_ft = fn.copy(), ft.copy()
-    new_fn[free], new_ft[free] = changed[:, 0], changed[:, 1]
+    new_fn[free], new_ft[free] = nearest_forces(matrix, carried, given, friction[free], scale).reshape(2, -1)
     return new_fn, new_ft
