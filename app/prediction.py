@@ -26,8 +26,17 @@ if TYPE_CHECKING:
     from .tracking.picture_quality import PictureQuality
 
 GOOD, POOR = 0.9, 0.75  # expected r(f_n) from which on nothing is wrong, and below which something is
-CORRECTED = ("outlier_tracks", "missing_poses", "photograph_repeated")  # named causes that a run corrects itself
+CORRECTED = (
+    "outlier_tracks",
+    "missing_poses",
+    "photograph_repeated",
+    "stretched_picture",
+    "lens",
+)  # named causes that a run corrects itself
 MOST_STATED = 0.99  # expected r(f_n)
+# Expected r(f_n) from which on the forces fit the given friction, so that another one is not named: the sliding of few
+# contacts, which one wrong radius can contradict, is weaker evidence.
+FITTING = 0.985
 DOUBTFUL = 0.97  # expected r(f_n) below which rival inputs are compared
 NO_EXPECTATION = (math.nan, math.nan, math.nan)
 NOT_PREDICTED = (
@@ -106,7 +115,10 @@ def predict_accuracy(
         trial = solve_trial(inputs, PREDICTED_PHOTOGRAPHS, InferenceObserver(progress))
         doubtful = trial is not None and trial.expected[0] < DOUBTFUL
         doubted = solve_trial(inputs, observer=InferenceObserver(progress)) if doubtful else None
-        return Prediction(quality, trial, diagnosis=tuple(diagnose(inputs, doubted, progress)))
+        found = diagnose(inputs, doubted, progress)
+        if trial is not None and trial.expected[0] >= FITTING:
+            found = [each for each in found if each.cause != "friction"]
+        return Prediction(quality, trial, diagnosis=tuple(found))
     except UndeterminedError as error:
         return Prediction(quality, None, f"The first photographs alone do not determine everything: {error}.")
 

@@ -1,4 +1,4 @@
-"""Distortion of the camera from the gaps of touching pairs, for packings without walls.
+"""Distortion of the camera from the gaps of touching pairs.
 
 Surfaces of touching grains meet wherever in the picture they are and in whatever direction they touch. Gaps that grow
 towards the rim of the picture, or that depend on the direction of the pair, show a lens or pixels that are not square.
@@ -26,6 +26,7 @@ TERMS = ("a", "b", "k_1", "k_2", "k_3", "k_4", "p", "q", "c", "d")  # names of t
 MODELS = ((2,), (0, 1), (2, 3), (0, 1, 2), (0, 1, 2, 3), (0, 1, 6, 7), (0, 1, 2, 3, 6, 7))
 EXTENSIONS = ((3,), (8, 9), (4,), (4, 5))  # of a lens that was found: higher orders, another middle
 GAIN = 2.0  # standard errors, by which the likelihood of pairs that were not fitted must rise for an extension
+CERTAIN = 3.0  # standard errors of an extension's unknown for hard grains, for which any rise is enough then
 TILT = 1.0  # standard errors above which removing a perspective that must be an error gains more than it costs
 FITS = 3  # of an extension: which pairs are near enough depends on the correction
 MAX_OVERLAP = 2.5  # mean overlap over the scatter of touching gaps, above which readings of radii must be too large
@@ -42,8 +43,9 @@ class CameraDistortion:
 
     Notes
     -----
-    x_true = x + L [a (X, −Y) + b (Y, X) + (Σ k_i |ξ|^2i + p X + q Y) ξ + |ξ|² (c, d) − e ξ], i = 1 … 4, with
-    ξ = (x − x_0)/L = (X, Y), and e such that the mean length of the pairs stays the same: the pixel size is given.
+    x_true = x + L [a (X, −Y) + b (Y, X) + (Σ k_i |ξ|^2i + p X + q Y + 2 c X + 2 d Y) ξ + |ξ|² (c, d) − e ξ], i = 1 … 4,
+    with ξ = (x − x_0)/L = (X, Y), and e such that the mean length of the pairs stays the same: the pixel size is given.
+    c and d are those of Brown (1966); a lens with another middle has them, too.
     """
 
     value: Annotated[Array, Quantity("a, b, k_1 … k_4, p, q, c, d of the correction", dims="lens_term", since=2)]
@@ -80,6 +82,21 @@ class CameraDistortion:
             return position
         moved = np.tensordot(self.value, _displacements(position, self.middle, self.half_width), 1)
         return position + moved - self.shrinking * (position - self.middle)
+
+    def correct_scaled(self, position: Array, scale: float) -> Array:
+        """Return undistorted positions (…, 2) [m] with all distances from the middle multiplied by a factor."""
+        return self.middle + scale * (self.correct(position) - self.middle)
+
+    def common_scale(self) -> float:
+        """Return the factor of all distances with which touching surfaces meet by the given radii.
+
+        Notes
+        -----
+        1 − Σ (δ/R)/s² / Σ 1/s² over the sizes, with δ the error of the radius R of a size and s the relative one's
+        standard error.
+        """
+        weight = (self.size / np.maximum(self.radius_error_sd, 1e-12)) ** 2
+        return 1.0 - float(np.average(self.radius_error / self.size, weights=weight))
 
     def radial_change(self) -> float:
         """Return the radial displacement at the rim of the picture over its half-width, with the middle unchanged."""
@@ -215,7 +232,7 @@ def find_camera_distortion(
         if significant.any() and found.misfit < EXPLAINED * best.misfit:
             best, chosen = found, unknowns
     if set(chosen) & set(range(UNKNOWNS)[RADIAL]):
-        pairs, best, chosen = _extend(reading, pairs, best, chosen)
+        pairs, best, chosen = _extend(reading, pairs, best, chosen, soft)
     if soft:
         pairs, best, chosen = _add_perspective(reading, pairs, best, chosen)
     value = best.value[:UNKNOWNS]
@@ -271,7 +288,7 @@ class _Reading:
 
 
 def _extend(
-    reading: _Reading, pairs: _Pairs, best: TouchingFit, chosen: tuple[int, ...]
+    reading: _Reading, pairs: _Pairs, best: TouchingFit, chosen: tuple[int, ...], soft: bool
 ) -> tuple[_Pairs, TouchingFit, tuple[int, ...]]:
     """Add higher orders of a lens where pairs of the other half of the frames confirm them."""
     halves = reading.select(slice(0, None, 2)), reading.select(slice(1, None, 2))
@@ -283,7 +300,10 @@ def _extend(
         if len(unknowns) == len(chosen):
             continue
         after = _refit(halves[0], unknowns)
-        if _likelihood_gain(halves[1], before, after) > GAIN:
+        gain = _likelihood_gain(halves[1], before, after)
+        fit = after[1]
+        certain = not soft and bool((np.abs(fit.value[list(more)]) > CERTAIN * fit.sd[list(more)]).any())
+        if gain > GAIN or (gain > 0.0 and certain):
             before, chosen = after, unknowns
     return *_refit(reading, chosen), chosen
 
@@ -336,7 +356,7 @@ def _displacements(position: Array, middle: Array, half_width: float) -> Array:
     x = (position - middle) / half_width
     square = np.sum(x**2, axis=-1, keepdims=True)
     radial = [square**order * x for order in range(1, 5)]
-    decentred = [square * np.array([1.0, 0.0]), square * np.array([0.0, 1.0])]
+    decentred = [square * axis + 2.0 * x * (x @ axis)[..., None] for axis in np.eye(2)]
     return half_width * np.stack(
         [x * np.array([1.0, -1.0]), x[..., ::-1], *radial, x[..., :1] * x, x[..., 1:] * x, *decentred]
     )

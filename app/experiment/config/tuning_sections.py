@@ -107,7 +107,8 @@ class CalibrationSection(Section):
     )
 
     camera: Switch = key(
-        "Find the camera's motion relative to the walls between photographs; false: it did not move.",
+        "Find the camera's motion relative to the walls between photographs, and the distortion of the picture by a "
+        "lens or by pixels that are not square; false: neither.",
         default=BOUNDARY.camera,
     )
     walls_continue: Switch = key(

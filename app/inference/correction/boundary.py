@@ -13,6 +13,7 @@ from ...solver.bodies.rods import RodMaterial
 from ...solver.boundary.boundary_correction import Boundary, BoundarySettings, correct_boundary
 from ...solver.boundary.camera_distortion import CameraDistortion, find_camera_distortion
 from ...solver.boundary.size_classes import group_readings
+from ...solver.boundary.walls_in_picture import correct_walls_in_picture
 from ...solver.detection.precision import contradiction, describe_contradiction, measure_precision
 from ...solver.posterior.sequence_evidence import gather_position_evidence
 from ...tracks import Tracks, WallTracks
@@ -43,32 +44,56 @@ def measure_noise(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, str]:
 
 
 def correct_camera(
-    material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]
-) -> tuple[Tracks, str, CameraDistortion | None]:
-    """Remove the camera's distortion from a packing without walls, where gaps of touching pairs show one.
+    material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int], *, radii_known: bool = False
+) -> tuple[Tracks, WallTracks, str, CameraDistortion | None]:
+    """Remove the camera's distortion where gaps of touching pairs show one.
 
-    Walls, where there are any, are measured with the same camera and show it better. The radii of each size of soft
-    grains, which are not calibrated later, are corrected as well where no overlap explains their gaps.
+    Walls are corrected as well unless the given ones fit the corrected grains better. In a packing without walls the
+    radii of each size of soft grains, which are not calibrated later, are corrected where no overlap explains their
+    gaps.
+
+    Parameters
+    ----------
+    material : RodMaterial
+    tracks : Tracks
+    walls : WallTracks
+    failed : collection of int
+        Unusable frames.
+    radii_known : bool
+        Whether the radii are exact enough to give the pixel size of a distorted picture.
 
     Returns
     -------
     Tracks
+    WallTracks
     str
         Sentences on the correction and on what remains; empty: neither.
     CameraDistortion or None
-        The distortion and the errors of the radii; None: not sought.
+        The distortion and the errors of the radii; None: not sought, or with walls: none.
     """
-    if walls.count or walls.cell is not None:
-        return tracks, "", None
+    if walls.cell is not None:
+        return tracks, walls, "", None
     soft = material.stiffness not in (None, "rigid")
     classes = group_readings(tracks.radius)  # whole pixels are few different radii, but no sizes
     classes = radius_classes(tracks.radius) if classes is None else classes
     position = np.where(tracks.present[..., None], tracks.position, np.nan)
-    alike = np.zeros(tracks.grain_count, np.int64)
-    classes = alike if classes is None else classes
-    found = find_camera_distortion(position, tracks.radius, classes, soft=soft)
+    classes = np.zeros(tracks.grain_count, np.int64) if classes is None else classes
+    found = find_camera_distortion(position, tracks.radius, classes, soft=soft and not walls.count)
     if found is None:
-        return tracks, "", None
+        return tracks, walls, "", None
+    if walls.count:
+        if not found.applied:  # calibration finds a lesser distortion with the walls
+            return tracks, walls, "", None
+        scale = found.common_scale() if radii_known and not soft else 1.0
+        corrected = found.correct_scaled(position, scale)
+        ends = correct_walls_in_picture(found, walls.endpoints, walls.side, corrected, tracks.radius, scale=scale)
+        sentences = found.describe()
+        if scale != 1.0:
+            sentences[0] += f", and distances were multiplied by {scale:.4f}, so that grains of the known radii meet"
+        if ends is walls.endpoints:
+            sentences.append("walls were not in this picture: they are used as given")
+        kept = np.where(tracks.present[..., None], corrected, tracks.position)
+        return replace(tracks, position=kept), replace(walls, endpoints=ends), "; ".join(sentences), found
     sentences, radius = found.describe(), tracks.radius
     correction = found.class_correction(_noise_of_gaps(material, tracks, walls, failed)) if soft else None
     if correction is not None:
@@ -78,7 +103,9 @@ def correct_camera(
             f"{1e6 * each:+.0f} ± {1e6 * sd:.0f}" for each, sd in zip(correction, found.radius_error_sd, strict=True)
         )
         sentences.append(f"radii of the sizes are corrected by {changes} µm, so that grains of all sizes touch alike")
-    return replace(tracks, position=found.correct(tracks.position), radius=radius), "; ".join(sentences), found
+    return (
+        replace(tracks, position=found.correct(tracks.position), radius=radius), walls, "; ".join(sentences), found,
+    )  # fmt: skip
 
 
 def _noise_of_gaps(material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]) -> float:

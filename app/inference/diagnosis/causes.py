@@ -70,7 +70,11 @@ CAUSES: dict[str, Cause] = {
     ),
     "stretched_picture": Cause(
         "rods that touch seem apart in one direction and overlap in the other",
-        "calibrate the camera: x and y have different scales",
+        "calibrate the camera: x and y have different scales; a run removes it as far as the gaps show it",
+    ),
+    "lens": Cause(
+        "rods that touch seem apart in one part of the picture and overlap in another",
+        "calibrate the camera (photographs.lens); a run removes it as far as the gaps show it",
     ),
     "all_radii": Cause("contacts are lost or invented", "measure the radii anew, or the pixel size"),
     "class_radii": Cause("contacts of one size of rods are lost or invented", "measure the radii of every size anew"),

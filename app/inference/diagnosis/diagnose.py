@@ -33,6 +33,7 @@ from .direct_tests import (
     examine_walls,
     find_impossible_poses,
 )
+from .distortion import undistorted
 from .resistance import examine_resistance
 from .rivals import rivals_of
 from .trial import TRIAL_PHOTOGRAPHS, Trial, select_window, solve_trial, trial_score
@@ -81,16 +82,13 @@ def diagnose(
     walls, failed = complete_walls(inputs.tracks, inputs.walls)
     if len(failed) == inputs.tracks.frame_count:
         return []
-    found = [*examine_rotations(inputs.tracks, walls), *examine_order(inputs.tracks)]
-    found += (
-        examine_walls(inputs.tracks, walls)
-        or examine_wall_times(inputs.tracks, walls)
-        or examine_wall_places(inputs.tracks, walls)
-    )
-    found += examine_sizes(inputs.tracks, walls)
-    found += examine_inertia(inputs.tracks, walls, inputs.material)
-    impossible = find_impossible_poses(inputs.tracks, walls)
-    poses = examine_poses(inputs.tracks, impossible)
+    tracks, walls, camera = undistorted(inputs, walls, failed)
+    found = [*examine_rotations(tracks, walls), *examine_order(tracks)]
+    found += examine_walls(tracks, walls) or examine_wall_times(tracks, walls) or examine_wall_places(tracks, walls)
+    found += examine_sizes(tracks, walls)
+    found += examine_inertia(tracks, walls, inputs.material)
+    impossible = find_impossible_poses(tracks, walls)
+    poses = examine_poses(tracks, impossible)
     if not found and sliding and inputs.tracks.grain_count >= LEAST_GRAINS:
         found = _examine_sliding(inputs, first)
     if not (found or trial is None or inputs.tracks.grain_count < LEAST_GRAINS):
@@ -99,7 +97,7 @@ def diagnose(
         found = [each for each in found if each.cause != "not_explained"]
     if found:  # wrong radii look like a few jumps
         poses = [each for each in poses if each.cause != "outlier_tracks"]
-    return [*found, *poses]
+    return [*found, *camera, *poses]
 
 
 def _compare_rivals(inputs: Inputs, trial: Trial, progress: Progress, first: int) -> list[Finding]:

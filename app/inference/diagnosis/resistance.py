@@ -12,6 +12,12 @@ from ...solver.convex.resistance import FRAMES, Resistance, base_drag_of, find_i
 from ...solver.nlgs.chain import ChainSettings, force_scale
 from ..corrected_sequence import CorrectedSequence
 from .causes import finding
+from .data_quality import measure_data_quality
+
+# Fraction of the contacts that slide beyond noise, from which on an attraction is named: forces that only push explain
+# the noise of contacts at rest worse than forces of either sign. Sheared packings slide at .2 and more of them; under
+# a rising pressure, or nearly jammed, at less than .06, and there the attraction was named wrongly.
+LEAST_SLIDING = 0.1
 
 
 def examine_resistance(sequence: CorrectedSequence) -> list[Finding]:
@@ -22,6 +28,8 @@ def examine_resistance(sequence: CorrectedSequence) -> list[Finding]:
     unit = force_scale(packing, ChainSettings())
     found = find_in_sequence(packing, snapshots, first, unit, probability, sequence.settings.workers)
     if found is None or not found.cause or (found.cause == "friction" and sequence.friction_measured):
+        return []
+    if found.cause == "adhesion" and not _slides(sequence):
         return []
     words: dict[str, Callable[[], str]] = {
         "photographs_reversed": lambda: "friction acts along the sliding as given, and against it in reverse order",
@@ -40,6 +48,12 @@ def examine_resistance(sequence: CorrectedSequence) -> list[Finding]:
     }
     left = f"what contradicts the sliding falls from {100.0 * found.given_gap:.0f} to {100.0 * found.found_gap:.0f} %"
     return [finding(found.cause, f"{words[found.cause]()}; with that, {left}")]
+
+
+def _slides(sequence: CorrectedSequence) -> bool:
+    """Whether so many contacts slide beyond noise that they can show an attraction."""
+    quality = measure_data_quality(sequence.tracks, sequence.walls)
+    return quality is not None and quality.sliding > LEAST_SLIDING
 
 
 def _coefficient(sequence: CorrectedSequence, found: Resistance) -> str:

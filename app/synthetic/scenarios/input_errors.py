@@ -95,6 +95,25 @@ def stretch_picture(factor: float) -> Departure:
     return depart
 
 
+def distort_picture(factor: float) -> Departure:
+    """Move rods and ends of walls outward as a lens does, by a relative distance at the farthest corner."""
+
+    def depart(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+        middle = 0.5 * (observed.endpoints.min(axis=(0, 1, 2)) + observed.endpoints.max(axis=(0, 1, 2)))
+        farthest = float(np.linalg.norm(observed.endpoints - middle, axis=-1).max())
+
+        def distorted(points: Array) -> Array:
+            offset = points - middle
+            square = np.sum(offset**2, axis=-1, keepdims=True) / farthest**2
+            return points + factor * square * offset
+
+        return replace(
+            observed, position=distorted(observed.position), endpoints=distorted(observed.endpoints)
+        )  # fmt: skip
+
+    return depart
+
+
 def misstate_class(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
     """State the radius of the middle class too large."""
     radius, middle = observed.radius.copy(), np.median(observed.radius)

@@ -21,6 +21,6 @@ ScenarioName = Literal[
     "time_reversed", "shuffled", "swapped_frames", "duplicate_frame",
     "theta_sign", "theta_zero", "theta_degrees", "theta_absent",
     "mu_01", "mu_05", "walls_late", "top_fixed", "wall_inside",
-    "aspect_03", "aspect_1", "class_2", "some_radii", "wrong_class", "overhang", "outliers", "one_jump",
+    "aspect_03", "aspect_1", "lens_03", "class_2", "some_radii", "wrong_class", "overhang", "outliers", "one_jump",
     "missing_poses",
 ]  # fmt: skip

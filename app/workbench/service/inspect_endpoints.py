@@ -9,7 +9,7 @@ import numpy as np
 
 from ...process.errors import InputError
 from ...results.results import Results
-from ...reviewing.rounding import rounded
+from ...reviewing.rounding import rounded, rounded_one
 from ...tracks import TrackStatus
 from ..inspecting.grain_motion import grain_motion
 from ..inspecting.pair_history import forces_without, pair_history
@@ -97,6 +97,7 @@ def rod(workbench: Workbench, at: Text, id: Whole) -> dict[str, Any]:
         "displacement": before + rounded(np.where(seen, moved, np.nan)),
         "radius": float(tracks.radius[row]), "zncc": before + rounded(tracks.zncc[:, row]),
         "sigma": before + rounded(tracks.sigma[:, row]), "rotation": before + rounded(tracks.rotation[:, row]),
+        "centre_sigma": None if tracks.centre_sigma is None else rounded_one(float(tracks.centre_sigma[row])),
         "status": before + [TrackStatus(each).name.lower() for each in tracks.status[:, row].tolist()],
         "unbalance": before + rounded([
             float("nan") if f.grain_unbalance is None else f.grain_unbalance[row] for f in results.frames

@@ -209,7 +209,8 @@ function rodCard(app) {
     h("div", { class: "fact" }, h("b", {}, bodyName(chosen.id)), h("span", { class: "pill" }, n < 0 ? "lost" : net.rods.status[n])),
     rodPast ? [
       fact("radius", measured("length", rodPast.radius)), fact("rotation", rodPast.rotation[k] === null ? "unknown" : `${digits(rodPast.rotation[k] * 180 / Math.PI, 3)}°`),
-      fact("position sd", rodPast.sigma[k] === null ? "–" : `± ${digits(rodPast.sigma[k] * 1e6, 2)} µm`), fact("force residual / mean f_n", digits(rodPast.unbalance[k], 2)),
+      rodPast.centre_sigma === null ? null : fact("centre sd, the same in all", `± ${digits(rodPast.centre_sigma * 1e6, 2)} µm`),
+      fact("motion sd", rodPast.sigma[k] === null ? "–" : `± ${digits(rodPast.sigma[k] * 1e6, 2)} µm`), fact("force residual / mean f_n", digits(rodPast.unbalance[k], 2)),
       h("span", { class: "soft" }, "correlation over the frames"), chart(58, "correlation over the frames", (c, w, hh) => spark(app, c, w, hh, seen.zncc, null, false)),
     ] : null,
     h("span", { class: "soft" }, "contacts"),
