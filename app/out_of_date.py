@@ -9,10 +9,10 @@ from typing import Any
 from .experiment.experiment import Experiment, load_experiment, settings_of_file, stamp_of_input
 from .process.errors import InputError, RunError
 from .process.sources import hash_of_code
+from .process.stages import FORCES
 from .process.version import library_versions
 from .results.manifest import Manifest
 from .run_folder import RECORDING, RESULTS, owner_of
-from .stages import FORCES
 from .verdicts.decisions import fingerprint
 from .verdicts.log import VERDICTS, VerdictLog
 

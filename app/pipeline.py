@@ -30,6 +30,7 @@ from .process.atomic import write_atomically
 from .process.errors import InputError
 from .process.machine.free_memory import release_free_memory
 from .process.sources import hash_of_code
+from .process.stages import EFFECTS, FORCES, PHOTOGRAPHS_SHOWN, TRACKING
 from .results.checkpoint import Checkpoint
 from .results.hdf5.lazy_sequences import LazySequence
 from .results.hdf5.store import Provenance, load_results, load_tracks, origin_of, save_tracks
@@ -39,7 +40,6 @@ from .results.truth import TRUTH_COLUMNS, read_truth, score, true_ids
 from .run_folder import RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, Run, find_experiment
 from .run_truth import load_truth, refuse_unnamed_truth
 from .solver.parallel import available_cores
-from .stages import EFFECTS, FORCES, PHOTOGRAPHS_SHOWN, TRACKING
 from .tracking import DETECTIONS, PICTURES
 from .tracks import Tracks, WallTracks
 from .verdicts.decisions import BodyNames, decide

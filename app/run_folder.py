@@ -28,6 +28,7 @@ from .process.links import refuse_link
 from .process.lock import hold_folder
 from .process.progress import Progress, no_progress
 from .process.sources import hash_of_code
+from .process.stages import Stage
 from .process.version import library_versions
 from .results.checkpoint import Checkpoint
 from .results.hdf5.store import Provenance
@@ -35,7 +36,6 @@ from .results.manifest import MANIFEST, NAMES, Manifest
 from .results.results import Results
 from .solver.frame_forces import FrameForces
 from .solver.statistics.frame_statistics import FrameStatistics
-from .stages import Stage
 from .verdicts.decisions import fingerprint
 from .verdicts.log import VerdictLog
 

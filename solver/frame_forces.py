@@ -169,6 +169,13 @@ class FrameForces:
     relative_error: Annotated[float, Quantity("error of the forces that the budget divides, ‖σ‖ / ‖f‖", since=2)] = NAN
     failed_reason: Annotated[str, Quantity("why it could not be solved; empty where it was", since=2)] = ""
 
+    @property
+    def bearing(self) -> Array:
+        """P(bears force) of every contact (c,); where it was not computed, whether it carries a normal force."""
+        if self.bearing_probability is None:
+            return (self.fn > 0.0).astype(np.float64)
+        return np.nan_to_num(self.bearing_probability)
+
     def scaled(self, factor: float) -> FrameForces:
         """The same with all reported forces and their standard deviations multiplied."""
         return replace(

@@ -13,7 +13,8 @@ import pytest
 import rodsight
 from hypothesis import HealthCheck, Phase, settings
 from playwright.sync_api import Browser, Page, expect, sync_playwright
-from rodsight.synthetic.synthesis import synthesize
+from rodsight.compilation.ahead import KernelsAhead
+from rodsight.synthetic.synthesis import SynthesisSettings, synthesize
 
 from tests.browser import FLAGS, SECONDS, SEEN, find_chromium
 from tests.scheduling import rank_of, schedule_by_folder
@@ -45,7 +46,7 @@ def signals_reach_children() -> None:
 def made_tracks(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small tracked experiment with truth; not to be written to."""
     folder = tmp_path_factory.mktemp("synthetic") / "tracked"
-    synthesize(folder, grains=40, frames=5, photographs=False, noise=1e-5, seed=1)
+    synthesize(folder, SynthesisSettings(grains=40, frames=5, photographs=False, noise=1e-5, seed=1))
     return folder
 
 
@@ -70,7 +71,7 @@ def tracked(made_tracks: Path, tmp_path: Path) -> Path:
 def made_photographs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small photographed experiment with truth; not to be written to."""
     folder = tmp_path_factory.mktemp("synthetic") / "photographed"
-    synthesize(folder, grains=30, frames=4, seed=2)
+    synthesize(folder, SynthesisSettings(grains=30, frames=4, seed=2))
     return folder
 
 
@@ -109,6 +110,14 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """Run all fast tests in two processes; chosen tests, other lanes and benchmarks in this process alone."""
     whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS and not config.option.benchmark_only
     return min(2, os.cpu_count() or 1) if whole and config.option.markexpr == FAST else 0
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_setupnodes() -> None:
+    """Compile missing kernels once, before the processes of the tests would each compile them."""
+    kernels = KernelsAhead()
+    with kernels.compiling(("",), all_uses=True):
+        kernels.wait("")
 
 
 @pytest.hookimpl(optionalhook=True)

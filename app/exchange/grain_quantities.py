@@ -60,9 +60,7 @@ def _measure_forces(results: Results, frame: int, length: float, columns: dict[s
     if forces.status is FrameStatus.FAILED:
         return
     contacts, n, present = forces.contacts, tracks.grain_count, tracks.present[frame]
-    bears = forces.bearing_probability
-    bears = (forces.fn > 0.0).astype(np.float64) if bears is None else np.nan_to_num(bears)
-    total = sum_on_grains(contacts, bears)
+    total = sum_on_grains(contacts, forces.bearing)
     columns["coordination_number"][frame] = np.where(present, total[:n], np.nan)
     stress = grain_stresses(contacts, forces.fn, forces.ft, results.grains.radius, length)[:n]
     stress[~present] = np.nan

@@ -106,11 +106,14 @@ def _draw_fluctuations(axes: Axes, results: Results, frame: int, found: Sequence
         )  # fmt: skip
 
 
+def _shown_windows(found: SequenceKinematics) -> list[int]:
+    count = len(found.window_frames)
+    return np.unique(np.linspace(0, count - 1, min(SHOWN_WINDOWS, count)).round().astype(int)).tolist()
+
+
 def _draw_distribution(axes: Axes, found: SequenceKinematics) -> None:
     middle = 0.5 * (FLUCTUATION_EDGES[1:] + FLUCTUATION_EDGES[:-1])
-    count = len(found.window_frames)
-    shown = np.unique(np.linspace(0, count - 1, min(SHOWN_WINDOWS, count)).round().astype(int))
-    for w, colour, dash in zip(shown.tolist(), COLOURS, DASHES, strict=False):
+    for w, colour, dash in zip(_shown_windows(found), COLOURS, DASHES, strict=False):
         label = f"strain {found.window_strain[w]:.1e}"
         axes.plot(middle, _positive(found.window_density[w]), color=colour, linestyle=dash, label=label)
     axes.plot(middle, np.exp(-0.5 * middle**2) / np.sqrt(2.0 * np.pi), color=INK, linewidth=0.6, label="Gaussian")
@@ -121,9 +124,7 @@ def _draw_distribution(axes: Axes, found: SequenceKinematics) -> None:
 
 def _draw_correlation(axes: Axes, found: SequenceKinematics) -> None:
     middle = 0.5 * (DISTANCE_EDGES[1:] + DISTANCE_EDGES[:-1])
-    count = len(found.window_frames)
-    shown = np.unique(np.linspace(0, count - 1, min(SHOWN_WINDOWS, count)).round().astype(int))
-    for w, colour, dash in zip(shown.tolist(), COLOURS, DASHES, strict=False):
+    for w, colour, dash in zip(_shown_windows(found), COLOURS, DASHES, strict=False):
         axes.plot(middle, found.window_correlation[w], color=colour, linestyle=dash)
     axes.axhline(0.0, color=INK, linewidth=0.5)
     axes.set(xlabel="distance over d", ylabel="correlation C(r)", ylim=(-0.6, 1.0))

@@ -26,13 +26,13 @@ from ..inference.solve_frames import InferenceObserver
 from ..process.errors import InputError
 from ..process.frame_range import ALL_FRAMES
 from ..process.sources import hash_of_code
+from ..process.stages import FORCES
 from ..process.version import library_versions
 from ..results.checkpoint import Checkpoint
 from ..results.hdf5.store import Provenance, save_tracks
 from ..results.results import Results
 from ..run_folder import TRACKS, UNFINISHED, Run
 from ..solver.frame_forces import FrameForces, FrameStatus
-from ..stages import FORCES
 from ..tracking.follow import ReferenceGrains
 from ..tracking.stage import find_reference, track_photographs, write_found_tables
 from ..tracks import Tracks

@@ -13,7 +13,7 @@ from ..solver.contacts.contacts import ContactSource
 from ..solver.frame_forces import FrameForces, FrameStatus
 from ..solver.parallel import prefetch
 from ..solver.sequence.failure import describe_error, failed_frame
-from ..solver.sequence.frames import solve_sequence
+from ..solver.sequence.frames import SequencePart, solve_sequence
 from ..solver.statistics.frame_statistics import ContactProbabilities, FrameStatistics, frame_statistics, no_statistics
 from .corrected_sequence import CorrectedSequence
 from .frame_store import FrameStore, SolvedFrame
@@ -49,9 +49,8 @@ def solve_frames(sequence: CorrectedSequence, store: FrameStore, observer: Infer
     if done == total:
         return
     solved = solve_sequence(
-        sequence.packing, sequence.snapshots, sequence.settings,
-        state=states[-1] if states else None, earlier=states[:-1], first=done, verdicts=sequence.verdicts,
-        failed=sequence.failed, observer=partial(observer.failed, "solving"), ahead=True,
+        sequence.packing, sequence.snapshots, sequence.settings, SequencePart(done, states, whole=True),
+        verdicts=sequence.verdicts, failed=sequence.failed, observer=partial(observer.failed, "solving"),
     )  # fmt: skip
     for forces, state in prefetch(solved, sequence.settings.workers):
         try:

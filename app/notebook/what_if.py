@@ -227,5 +227,6 @@ def _with_steps(
     rows = np.flatnonzero(np.isin(contacts.i, list(steps)) | np.isin(contacts.j, list(steps)))
     if not len(rows):
         return contacts, forces.fn, forces.ft
-    fn, ft = rebalance(results.grains, contacts, forces.fn, forces.ft, rows, friction=limit, moved=moved)
+    force = np.stack([forces.fn, forces.ft])
+    fn, ft = rebalance(results.grains, contacts, force, rows, friction=limit, moved=moved)
     return moved, fn, ft

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..solver.bodies.grains import Array
 from ..solver.dem.dem_truth import DemSettings, UnbalancedError
-from ..solver.dem.shear_cell import ShearCell
+from ..solver.dem.shear_cell import FrameSize, ShearCell
 
 RADIUS_CLASSES = (0.007, 0.008, 0.011)  # [m], rods of 14, 16 and 22 mm
 CLASS_FRACTIONS = (0.40, 0.41, 0.19)  # by number: 1172 rods then fill 0.5 × 0.6 m
@@ -99,9 +99,8 @@ def prepare_packing(
     soft = replace(frictionless, normal_stiffness=SOFTENING * settings.normal_stiffness, pressure=float("nan"))
 
     def place(settings: DemSettings, at: Array, height: float, drag: float = 0.0) -> ShearCell:
-        return ShearCell(
-            radius, at, width=width, height=height, settings=settings, drag=drag, corner_radius=corner_radius
-        )
+        frame = FrameSize(width, height, corner_radius=corner_radius)
+        return ShearCell(radius, at, frame, settings, drag=drag)
 
     cell = place(soft, position, height, SOFT_DRAG)
     cell.run(np.zeros(SOFT_STEPS))

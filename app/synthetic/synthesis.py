@@ -96,79 +96,72 @@ class Synthesis:
     photograph_shape: tuple[int, int] | None  # rows, columns [px]
 
 
-def synthesize(
-    out: Path,
-    *,
-    preset: str = "small",
-    seed: int = 0,
-    photographs: bool = True,
-    noise: float | None = None,
-    depth: int = 8,
-    jpeg_quality: int | None = None,
-    png: bool = False,
-    grains: int | None = None,
-    frames: int | None = None,
-    step_degrees: float | None = None,
-    pixel_size: float | None = None,
-    reversal: bool = False,
-    radius_error: float = 0.0,
-    speckle: SpeckleSettings | None = None,
-    progress: Progress | None = None,
-) -> Synthesis:
-    """Simulate a simple shear test and write it as an experiment folder; the same arguments give the same bytes.
+@dataclass(frozen=True, slots=True)
+class SynthesisSettings:
+    """What a synthetic experiment is like. None: as in the preset.
+
+    Raises
+    ------
+    InputError
+        If a value is out of range.
+    """
+
+    preset: str = "small"  # small, paper or 1g2e
+    seed: int = 0
+    photographs: bool = True  # write photographs, whose grains are to be detected; otherwise tracks
+    noise: float | None = None  # [m] standard deviation of tracked positions; that of rotations is noise / radius [rad]
+    depth: int = 8  # bits of a photograph, 8 or 16; 16 bits are always PNG
+    jpeg_quality: int | None = None  # of 8-bit photographs, 1 … 100
+    png: bool = False  # write PNG at 8 bits
+    grains: int | None = None
+    frames: int | None = None
+    step_degrees: float | None = None  # [°] of shear between photographs
+    pixel_size: float | None = None  # [m]
+    reversal: bool = False  # reverse the shear half way
+    radius_error: float = 0.0  # that all stated radii share, as a fraction: −.02 states them 2 % too small
+    speckle: SpeckleSettings | None = None  # paint and camera; its pixel size and depth are replaced
+
+    def __post_init__(self) -> None:
+        _check_choices(self)
+        self.plan()
+
+    def plan(self) -> Preset:
+        """Return the preset with all that is given in its place. Raises InputError."""
+        names = ("grains", "frames", "step_degrees", "pixel_size")
+        given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        return _plan(PRESETS[self.preset], given, self.reversal)
+
+    def quality(self) -> int | None:
+        """Return the quality of JPEG photographs; None: PNG."""
+        if self.png or self.depth != 8:
+            return None
+        return self.plan().jpeg_quality if self.jpeg_quality is None else self.jpeg_quality
+
+
+def synthesize(out: Path, settings: SynthesisSettings | None = None, progress: Progress = no_progress) -> Synthesis:
+    """Simulate a simple shear test and write it as an experiment folder; the same settings give the same bytes.
 
     Parameters
     ----------
     out : Path
         Folder to write; must be absent or empty.
-    preset : {'small', 'paper', '1g2e'}
-    seed : int
-    photographs : bool
-        Write photographs, whose grains are to be detected; otherwise tracks.
-    noise : float, optional
-        Standard deviation [m] of tracked positions; that of rotations is noise / radius [rad]. Default: the preset's.
-    depth : {8, 16}
-        Bits of a photograph; 16 bits are always PNG.
-    jpeg_quality : int, optional
-        Of 8-bit photographs, 1 … 100; default: the preset's.
-    png : bool
-        Write PNG at 8 bits.
-    grains, frames : int, optional
-        Default: the preset's.
-    step_degrees : float, optional
-        Shear between photographs [°]; default: the preset's.
-    pixel_size : float, optional
-        Side of a pixel [m]; default: the preset's.
-    reversal : bool
-        Reverse the shear half way.
-    radius_error : float
-        Error that all stated radii share, as a fraction: −.02 states them 2 % too small.
-    speckle : SpeckleSettings, optional
-        Paint and camera; its pixel size and depth are replaced.
+    settings : SynthesisSettings, optional
     progress : callable, optional
         Called with stage, done and total.
 
     Raises
     ------
     InputError
-        If the folder is not empty or an argument is out of range.
+        If the folder is not empty.
     UnbalancedError
         If the simulation does not come to rest; nothing is written then.
     """
-    out = Path(out)
-    _check_choices(preset, seed, photographs, noise or 0.0, depth, jpeg_quality)
-    if not abs(radius_error) <= LARGEST_RADIUS_ERROR:
-        limit = f"expected a fraction from -{LARGEST_RADIUS_ERROR} to {LARGEST_RADIUS_ERROR}"
-        raise InputError("synth", f"radius_error = {radius_error}", limit)
-    given = {"grains": grains, "frames": frames, "step_degrees": step_degrees, "pixel_size": pixel_size}
-    plan = _plan(PRESETS[preset], {name: value for name, value in given.items() if value is not None}, reversal)
+    out, settings = Path(out), settings or SynthesisSettings()
+    seed, plan = settings.seed, settings.plan()
     experiment_files.refuse_full_folder(out)
-    speckle = replace(speckle or SpeckleSettings(), pixel_size=plan.pixel_size, depth=depth)
-    if jpeg_quality is None and depth == 8:
-        jpeg_quality = plan.jpeg_quality
-    jpeg_quality = None if png else jpeg_quality
+    speckle = replace(settings.speckle or SpeckleSettings(), pixel_size=plan.pixel_size, depth=settings.depth)
 
-    truth = _simulate(plan, seed, reversal, progress or no_progress)
+    truth = _simulate(plan, seed, settings.reversal, progress)
     truth = place_in_picture(cut_sides(truth), MARGIN + speckle.bar_thickness)
     old_unbalance = measure_old_unbalance(truth)
     event = int(np.nanargmax(old_unbalance)) if truth.frame_count > 1 else 0
@@ -178,18 +171,16 @@ def synthesize(
     walls = _write_walls(out, truth)
     experiment_files.write_truth_contacts(out / "truth_contacts.csv", truth)
     experiment_files.write_tracks(out / "truth_tracks.csv", ids, truth.position, truth.rotation)
-    if photographs:
-        source, shape = _write_photographs(
-            out, _Photographed(truth, plan.seconds, seed, radius_error), speckle, jpeg_quality, progress or no_progress
-        )
+    taken = _Photographed(truth, plan.seconds, seed, settings.radius_error)
+    if settings.photographs:
+        source, shape = _write_photographs(out, taken, speckle, settings.quality(), progress)
     else:
-        noise = plan.noise if noise is None else noise
-        source, shape = _write_tracks(out, _Photographed(truth, plan.seconds, seed, radius_error), noise), None
+        source, shape = _write_tracks(out, taken, plan.noise if settings.noise is None else settings.noise), None
     # Written last, so that an unfinished folder is not an experiment.
     experiment_files.write_experiment(
         out / "experiment.toml",
         name=out.resolve().name,
-        remark=_remark(preset, seed, truth, old_unbalance, event),
+        remark=_remark(settings.preset, seed, truth, old_unbalance, event),
         source=source,
         known=experiment_files.StatedInputs.of(truth.settings, plates=() if plan.corner_radius else ("top",)),
         walls=walls,
@@ -342,9 +333,8 @@ def _remark(preset: str, seed: int, truth: DemTruth, old_unbalance: Array, event
     return text
 
 
-def _check_choices(
-    preset: str, seed: int, photographs: bool, noise: float, depth: int, jpeg_quality: int | None
-) -> None:
+def _check_choices(settings: SynthesisSettings) -> None:
+    preset, seed, noise, depth = settings.preset, settings.seed, settings.noise or 0.0, settings.depth
     if preset not in PRESETS:
         raise InputError("synth", f"preset = {preset!r}", f"expected one of {', '.join(PRESETS)}")
     if seed < 0:
@@ -353,10 +343,14 @@ def _check_choices(
         raise InputError("synth", f"depth = {depth}", "expected 8 or 16 bits")
     if not (math.isfinite(noise) and noise >= 0.0):
         raise InputError("synth", f"noise = {noise}", "expected metres, 0 or more")
-    if photographs and noise > 0.0:
+    if settings.photographs and noise > 0.0:
         raise InputError("synth", f"noise = {noise}", "applies to tracks only: photographs have noise of their own")
-    if jpeg_quality is not None and not (1 <= jpeg_quality <= 100 and depth == 8):
-        raise InputError("synth", f"jpeg_quality = {jpeg_quality}", "expected 1 … 100, and a depth of 8 bits")
+    quality = settings.jpeg_quality
+    if quality is not None and not (1 <= quality <= 100 and depth == 8):
+        raise InputError("synth", f"jpeg_quality = {quality}", "expected 1 … 100, and a depth of 8 bits")
+    if not abs(settings.radius_error) <= LARGEST_RADIUS_ERROR:
+        limit = f"expected a fraction from -{LARGEST_RADIUS_ERROR} to {LARGEST_RADIUS_ERROR}"
+        raise InputError("synth", f"radius_error = {settings.radius_error}", limit)
 
 
 def _plan(preset: Preset, given: dict[str, float], reversal: bool) -> Preset:

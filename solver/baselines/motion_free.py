@@ -20,7 +20,7 @@ from ..bodies.packing import Packing
 from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts, detect_contacts, measure_contacts
 from ..contacts.pairs import Keys
-from ..convex.program import Balance, assemble_balance, project_onto_equilibrium
+from ..convex.program import Balance, LoadScale, assemble_balance, project_onto_equilibrium
 
 GAP_SIGMAS = 3.0  # greatest measured gap of a touching pair, in standard deviations of a gap
 AVERAGED = 2  # photographs before and after the frame over which overlaps are averaged
@@ -134,10 +134,10 @@ def _typical_force(packing: Packing, walls: Walls, snapshot: Snapshot) -> float:
 
 def _assemble(packing: Packing, walls: Walls, snapshot: Snapshot, contacts: Contacts, unit: float) -> Balance:
     material = packing.material
+    total = None if packing.scale_is_known else unit * int(contacts.gauge.sum())
     return assemble_balance(
         contacts, packing.grains, walls, present=snapshot.present,
-        friction=material.friction_at(contacts.with_wall), force_unit=unit, gravity=material.gravity,
-        wall_normal_total=None if packing.scale_is_known else unit * int(contacts.gauge.sum()),
+        friction=material.friction_at(contacts.with_wall), scale=LoadScale(unit, material.gravity, total),
     )  # fmt: skip
 
 

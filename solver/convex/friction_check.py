@@ -20,7 +20,7 @@ from ..parallel import parallel_map
 from ..quantity import Quantity
 from .ensemble_members import measured_slip
 from .friction_estimate import FACTORS, SlidingFrame, estimate_friction
-from .program import assemble_balance
+from .program import LoadScale, assemble_balance
 
 # The minimum of the power gap lies below the true friction: estimated over true friction on simulated packings, and its
 # relative standard deviation (packings of 500 and 1172 grains, μ = 0.15, 0.25 and 0.4).
@@ -147,25 +147,26 @@ def _sliding_frames(
     workers: int | None,
 ) -> list[SlidingFrame]:
     return parallel_map(
-        [partial(_sliding_frame, packing, snapshots, k, force_unit, settings) for k in numbers], workers
+        [partial(sliding_frame, packing.at_frame(snapshots, k), snapshots, k, force_unit, settings) for k in numbers],
+        workers,
     )
 
 
-def _sliding_frame(
+def sliding_frame(
     packing: Packing, snapshots: Sequence[Snapshot], k: int, force_unit: float, settings: ContactProbabilitySettings
 ) -> SlidingFrame:
-    packing = packing.at_frame(snapshots, k)
+    """Prepare a frame with neighbours on both sides; packing: as in this frame; force_unit: typical force [N]."""
     snapshot, window = snapshots[k], window_of(k, len(snapshots))
     contacts, probability = probable_contacts(
         packing.grains, [snapshots[f] for f in window], k - window.start, settings
     )
     walls = packing.walls_of(snapshot)
     friction = packing.material.friction_at(contacts.with_wall)
+    # The power gap does not depend on the scale of the forces, so any total is valid.
+    total = None if packing.scale_is_known else force_unit * max(int(contacts.gauge.sum()), 1)
     balance = assemble_balance(
-        contacts, packing.grains, walls, present=snapshot.present, friction=friction, force_unit=force_unit,
-        gravity=packing.material.gravity,
-        # The power gap does not depend on the scale of the forces, so any total is valid.
-        wall_normal_total=None if packing.scale_is_known else force_unit * max(int(contacts.gauge.sum()), 1),
+        contacts, packing.grains, walls, present=snapshot.present, friction=friction,
+        scale=LoadScale(force_unit, packing.material.gravity, total),
     )  # fmt: skip
     slip = measured_slip(contacts, packing.grains, walls, (snapshots[k - 1], snapshots[k + 1]))
     return SlidingFrame(balance, contacts, slip, probability)

@@ -9,7 +9,7 @@ it does not replace a tilt test. The standard deviation over frames does not con
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -151,16 +151,27 @@ def _bracket_minimum(trial: Array, gaps_of: Callable[[float], Array], workers: i
 def _power_gaps(
     frames: Sequence[SlidingFrame], factor: float, settings: ConvexSettings | None, of_walls: bool
 ) -> list[float]:
-    memory = ForceMemory.empty()
-    gaps = []
+    scales = [np.where(frame.contacts.with_wall | (not of_walls), factor, 1.0) for frame in frames]
+    return power_gaps(
+        [
+            replace(frame, balance=replace(frame.balance, friction=scale * frame.balance.friction))
+            for frame, scale in zip(frames, scales, strict=True)
+        ],
+        settings,
+    )
+
+
+def power_gaps(frames: Iterable[SlidingFrame], settings: ConvexSettings | None = None) -> list[float]:
+    """Relative power gaps of the forces of least gap, each frame continuing from the forces of the one before."""
+    memory, gaps = ForceMemory.empty(), []
     for frame in frames:
-        scale = np.where(frame.contacts.with_wall | (not of_walls), factor, 1.0)
-        balance = replace(frame.balance, friction=scale * frame.balance.friction)
         previous = memory.recall(frame.contacts)
-        forces = solve_convex_member(balance, frame.slip, frame.probability, previous[:, 0], previous[:, 1], settings)
+        forces = solve_convex_member(
+            frame.balance, frame.slip, frame.probability, previous[:, 0], previous[:, 1], settings
+        )
         all_present = np.ones(frame.contacts.grain_count, dtype=bool)
         memory = memory.renew(frame.contacts, np.column_stack([forces.fn, forces.ft]), all_present)
-        gaps.append(relative_power_gap(frame.slip, balance.friction, forces.fn, forces.ft))
+        gaps.append(relative_power_gap(frame.slip, frame.balance.friction, forces.fn, forces.ft))
     return gaps
 
 

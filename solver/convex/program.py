@@ -17,6 +17,7 @@ Inside, forces are in units of `force_unit` and torques are divided by the mean 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +76,16 @@ class ConvexForces:
     termination: str  # sentence for messages
 
 
+class LoadScale(NamedTuple):
+    """What sets the scale of the forces beside loaded plates."""
+
+    force_unit: float  # [N] a typical contact force
+    gravity: tuple[float, float] = (0.0, 0.0)  # [m/s²]
+    # [N] Sum of f_n over all contacts with walls, or over all contacts if there are no walls. Required without a loaded
+    # plate and without weight, where the forces are determined only up to a factor.
+    total: float | None = None
+
+
 def assemble_balance(
     contacts: Contacts,
     grains: Grains,
@@ -82,9 +93,7 @@ def assemble_balance(
     *,
     present: NDArray[np.bool_],
     friction: Array,
-    force_unit: float,
-    gravity: tuple[float, float] = (0.0, 0.0),
-    wall_normal_total: float | None = None,
+    scale: LoadScale,
 ) -> Balance:
     """Assemble the equilibrium equations of every present free grain and every loaded plate.
 
@@ -94,18 +103,13 @@ def assemble_balance(
         Grains found in the photograph.
     friction : (c,)
         Coefficient of friction of each contact.
-    force_unit : float
-        Typical contact force [N].
-    gravity : tuple
-        Acceleration [m/s²].
-    wall_normal_total : float, optional
-        Sum of f_n [N] over all contacts with walls, or over all contacts if there are no walls. Required without
-        a loaded plate and without weight, where the forces are determined only up to a factor.
+    scale : LoadScale
+        What sets the scale of the forces beside loaded plates.
 
     Raises
     ------
     ValueError
-        If neither a load, nor gravity, nor `wall_normal_total` fixes the scale of the forces.
+        If neither a load, nor gravity, nor a total fixes the scale of the forces.
 
     Notes
     -----
@@ -113,8 +117,9 @@ def assemble_balance(
     multiplied by `torque_weight`.
     """
     n, present = grains.count, present & grains.free
-    if not walls.loaded.any() and wall_normal_total is None and not any(gravity):
-        raise ValueError("no wall carries a load: wall_normal_total must fix the scale of the forces")
+    force_unit, gravity, total = scale
+    if not walls.loaded.any() and total is None and not any(gravity):
+        raise ValueError("no wall carries a load: a total must fix the scale of the forces")
     matrix = equilibrium_matrix(contacts, grains.radius, walls)
     load = external_load(grains.weight(gravity), walls, grains.moment)
     weight = np.full(len(load), 1.0 / force_unit)
@@ -127,10 +132,10 @@ def assemble_balance(
     load = weight * load
     rows = np.concatenate([np.tile(present, 3), np.ones(len(load) - 3 * n, dtype=bool)])
     matrix, load = matrix[rows], load[rows]
-    if wall_normal_total is not None:
-        total = np.concatenate([contacts.gauge.astype(np.float64), np.zeros(contacts.count)])
-        matrix = sparse.vstack([matrix, sparse.csr_matrix(total[None])])
-        load = np.append(load, wall_normal_total / force_unit)
+    if total is not None:
+        summed = np.concatenate([contacts.gauge.astype(np.float64), np.zeros(contacts.count)])
+        matrix = sparse.vstack([matrix, sparse.csr_matrix(summed[None])])
+        load = np.append(load, total / force_unit)
     matrix = sparse.csr_matrix(matrix)
     blocks = block_balance(matrix, load, int(present.sum()), contacts.count)
     return Balance(matrix, load, np.asarray(friction, dtype=np.float64), force_unit, blocks)

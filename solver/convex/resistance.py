@@ -11,10 +11,10 @@ import numpy as np
 from ..bodies.grains import Array
 from ..bodies.motion import Snapshot
 from ..bodies.packing import Packing
-from ..detection.touch_probability import ContactProbabilitySettings, probable_contacts, window_of
+from ..detection.touch_probability import ContactProbabilitySettings
 from ..parallel import parallel_map
-from .ensemble_members import measured_slip
-from .program import assemble_balance, weigh_rows
+from .friction_check import sliding_frame
+from .program import weigh_rows
 from .sliding_model import Parameter, ResistedFrame, SlidingModel, compare_models, power_gap
 
 CLEAR = 0.62  # gap of a rival over that of the given model, and of another friction alone, below which it is named
@@ -198,32 +198,14 @@ def base_drag_of(packing: Packing, model: SlidingModel, force_unit: float) -> fl
 def _resisted_frame(
     packing: Packing, snapshots: Sequence[Snapshot], k: int, force_unit: float, settings: ContactProbabilitySettings
 ) -> ResistedFrame:
-    snapshot, window = snapshots[k], window_of(k, len(snapshots))
-    contacts, probability = probable_contacts(
-        packing.grains, [snapshots[f] for f in window], k - window.start, settings
-    )
-    walls = packing.walls_of(snapshot)
     free = replace(packing, grains=replace(packing.grains, drag=None, moment=None, moment_sd=None))
-    balance = assemble_balance(
-        contacts, free.grains, walls, present=snapshot.present,
-        friction=packing.material.friction_at(contacts.with_wall), force_unit=force_unit,
-        gravity=packing.material.gravity,
-        # The power gap does not depend on the scale of the forces, so any total is valid.
-        wall_normal_total=None if packing.scale_is_known else force_unit * max(int(contacts.gauge.sum()), 1),
-    )  # fmt: skip
-    slip = measured_slip(contacts, packing.grains, walls, (snapshots[k - 1], snapshots[k + 1]))
-    present = snapshot.present & packing.grains.free
-    rows = np.ones(len(balance.load))
-    count = int(present.sum())
+    frame = sliding_frame(free, snapshots, k, force_unit, settings)
+    count = int((snapshots[k].present & packing.grains.free).sum())
+    rows = np.ones(len(frame.balance.load))
     rows[2 * count : 3 * count] = TORQUE_WEIGHT
-    return ResistedFrame(
-        weigh_rows(balance, rows, count),
-        contacts,
-        slip,
-        probability,
-        _unit_drag(packing, snapshots, k, len(balance.load)),
-        count,
-    )
+    drag = _unit_drag(packing, snapshots, k, len(rows))
+    balance = weigh_rows(frame.balance, rows, count)
+    return ResistedFrame(balance, frame.contacts, frame.slip, frame.probability, drag, count)
 
 
 def _unit_drag(packing: Packing, snapshots: Sequence[Snapshot], k: int, rows: int) -> Array:

@@ -16,12 +16,10 @@ from typing import Literal
 import numpy as np
 
 from ..bodies.grains import Array
-from ..contacts.contacts import Contacts
-from ..nlgs.force_memory import ForceMemory
 from ..parallel import parallel_map
-from .friction_estimate import relative_power_gap
+from .friction_estimate import SlidingFrame, power_gaps
 from .grain_blocks import block_balance
-from .program import Balance, ConvexSettings, solve_convex_member
+from .program import Balance, ConvexSettings
 
 # `all_friction` is that of grains, with that of walls in its given proportion.
 Parameter = Literal["friction", "all_friction", "wall_friction", "base_drag", "attraction"]
@@ -58,13 +56,9 @@ class SlidingModel:
 
 
 @dataclass(frozen=True, slots=True)
-class ResistedFrame:
-    """Balance and sliding of one frame."""
+class ResistedFrame(SlidingFrame):
+    """Balance without drag, and sliding of one frame."""
 
-    balance: Balance  # without drag
-    contacts: Contacts
-    slip: Array  # (c,) of `soft_slip`
-    probability: Array  # (c,) P(touch)
     drag: Array  # (m,) load b of a unit of `base_drag`
     grain_count: int
 
@@ -89,6 +83,10 @@ class ResistedFrame:
         blocks = block_balance(given.matrix, load, self.grain_count, given.contact_count)
         return replace(given, load=load, grains=blocks, friction=friction)
 
+    def under(self, model: SlidingModel) -> SlidingFrame:
+        """The sliding with the balance under a model."""
+        return SlidingFrame(self.balance_of(model), self.contacts, self.slip, self.probability)
+
 
 @dataclass(frozen=True, slots=True)
 class FittedModel:
@@ -112,15 +110,9 @@ class _Search:
 
 def power_gap(frames: Sequence[ResistedFrame], model: SlidingModel, settings: ConvexSettings | None = None) -> float:
     """Mean relative power gap of the forces of least gap under a model; NaN where nothing slides."""
-    memory, gaps = ForceMemory.empty(), []
-    for frame in frames:
-        balance = frame.balance_of(model)
-        previous = memory.recall(frame.contacts)
-        forces = solve_convex_member(balance, frame.slip, frame.probability, previous[:, 0], previous[:, 1], settings)
-        present = np.ones(frame.contacts.grain_count, dtype=bool)
-        memory = memory.renew(frame.contacts, np.column_stack([forces.fn, forces.ft]), present)
-        gaps.append(relative_power_gap(frame.slip, balance.friction, forces.fn, forces.ft))
-    return float(np.mean(gaps)) if gaps else np.nan
+    if not frames:
+        return np.nan
+    return float(np.mean(power_gaps((each.under(model) for each in frames), settings)))
 
 
 def fit_model(frames: Sequence[ResistedFrame], start: SlidingModel, free: Sequence[Parameter]) -> FittedModel:

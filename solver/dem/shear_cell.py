@@ -7,7 +7,7 @@ carries a constant pressure unless it is driven. The right side can move along t
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,16 @@ LOAD_STEPS = 40  # in which a load is changed
 SIDE_MARGIN = 1.12  # length of the sides over the first height, for dilation and for the slant at 15°
 
 
+class FrameSize(NamedTuple):
+    """Size of a shear frame [m]."""
+
+    width: float
+    height: float
+    # Of the bars at bottom and top, the width by default; longer where the right side moves outwards.
+    span: float | None = None
+    corner_radius: float = 0.0  # of discs where the bars meet; 0: none
+
+
 class ShearCell(Simulation):
     """A packing in a shear frame.
 
@@ -48,14 +58,11 @@ class ShearCell(Simulation):
         self,
         radius: Array,
         position: Array,
-        *,
-        width: float,
-        height: float,
+        frame: FrameSize,
         settings: DemSettings,
+        *,
         velocity: Array | None = None,
         drag: float = 0.0,
-        span: float | None = None,
-        corner_radius: float = 0.0,
     ) -> None:
         """Place grains in a rectangular frame.
 
@@ -65,28 +72,25 @@ class ShearCell(Simulation):
             Radii [m].
         position : (n, 2)
             Centres [m].
-        width, height
-            Size of the frame [m].
+        frame
+            Its size at the start.
         settings
             Material, load and numerics.
         velocity : (n, 3), optional
             Velocities and spins [m/s, m/s, rad/s]; at rest by default.
         drag
             Damping rate of every grain [1/s], for the preparation of a packing only.
-        span
-            Length of the bars at bottom and top [m], the width by default; longer where the right side moves outwards.
-        corner_radius
-            Radius of discs where the bars meet [m]; 0: none.
         """
+        width, height = frame.width, frame.height
         grains = Grains.of_rods(radius, density=settings.density, length=settings.length)
         plates = np.array([
             plate_constants(grains, settings, width, settings.pressure * width * settings.length),
             plate_constants(grains, settings, height, np.nan),
         ])  # fmt: skip
-        boundary = Boundary(FRAME, np.array([0.0, height, 0.0, width, 0.0, corner_radius]), plates, np.zeros(4))
+        boundary = Boundary(FRAME, np.array([0.0, height, 0.0, width, 0.0, frame.corner_radius]), plates, np.zeros(4))
         super().__init__(grains, position, boundary, settings=settings, velocity=velocity, drag=drag)
         self._side_length = SIDE_MARGIN * height
-        self._span = width if span is None else span
+        self._span = width if frame.span is None else frame.span
 
     @property
     def shear(self) -> float:

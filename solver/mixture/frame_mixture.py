@@ -7,6 +7,7 @@ motion estimate, which assumes hard grains, then gets less weight, the larger th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -47,6 +48,13 @@ class ForceEstimate:
     ft_sd: Array
 
 
+class Softness(NamedTuple):
+    """How far overlaps of soft grains and their motion count."""
+
+    trust: float  # greatest trust in the overlaps
+    motion_weight: float = 1.0  # see `motion_weight`
+
+
 def mix_on_contacts(
     contacts: Contacts,
     motion: ForceEstimate,
@@ -54,8 +62,7 @@ def mix_on_contacts(
     motion_trust: float,
     *,
     scale_known: bool,
-    soft_trust: float | None,
-    weight: float = 1.0,
+    softness: Softness | None = None,
     position_weight: float | None = None,
 ) -> Mixture:
     """Mix the motion estimate with the position-only estimate on the contacts of the motion estimate.
@@ -72,10 +79,8 @@ def mix_on_contacts(
         Lower bound of the motion estimate's correlation with the truth; NaN where no motion leads to the frame.
     scale_known : bool
         Whether loads or weight determine the scale of the position-only estimate.
-    soft_trust : float or None
-        Greatest trust in overlaps of soft grains; None: grains are hard.
-    weight : float
-        Weight of motion of soft grains, see `motion_weight`.
+    softness : Softness, optional
+        None: grains are hard.
     position_weight : float, optional
         Weight of the position-only estimate; None: from the trusts of both.
 
@@ -94,15 +99,15 @@ def mix_on_contacts(
     The sum of f_n is the motion's. For soft grains with a known scale it is multiplied by q^(weight − 1); without
     motion and with a known scale it is that of the positions.
     """
-    weight = 1.0 if soft_trust is None else 0.0 if np.isnan(motion_trust) else weight
+    weight = 1.0 if softness is None else 0.0 if np.isnan(motion_trust) else softness.motion_weight
     expected = expected_of_motion(motion_trust, scale_known=scale_known)
     field = ForceField(contacts.key, np.column_stack([motion.fn, motion.ft]), motion_trust, expected)
     found = mix_fields(field, positions, weight, position_weight)
     other = _match_to(contacts, positions)
     factor = float(motion.fn.sum() / positions.fn.sum())
     force, trust = match_values(contacts.key, found.key, found.force, fill=0.0), found.trust
-    if soft_trust is not None:
-        trust = soft_mixture_trust(trust, positions.trust, soft_trust, weight)
+    if softness is not None:
+        trust = soft_mixture_trust(trust, positions.trust, softness.trust, weight)
         if scale_known:  # the stress along free walls follows from sliding, which overlaps do not show
             force, factor = force * factor ** (weight - 1.0), factor**weight
     elif scale_known and np.isnan(motion_trust):  # an initial guess has no scale, and any other violates the loads

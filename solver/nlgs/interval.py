@@ -14,7 +14,7 @@ from ..bodies.packing import Packing
 from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts
 from ..detection.contact_networks import Network
-from .problem import ContactProblem, assemble
+from .problem import ContactProblem, PreparedContacts, assemble
 from .sweeping.ordering import VisitingOrder, order_contacts
 
 
@@ -58,7 +58,7 @@ class Interval:
                     return Instant(problem, network.contacts, network.walls)
             problem = assemble(
                 self.packing.grains, network.state, network.walls, network.contacts, self.packing.material, impedance,
-                closing=network.closing, order=network.order,
+                PreparedContacts(network.closing, network.order),
             )  # fmt: skip
             network.problems.append((impedance, problem))
             return Instant(problem, network.contacts, network.walls)

@@ -91,6 +91,15 @@ def inertial_impedance(grains: Grains, *, interval: float, formal_weight: float 
     return grains.mass / interval / (1.0 - formal_weight)
 
 
+class PreparedContacts(NamedTuple):
+    """What is known of contacts before a problem is assembled."""
+
+    # Velocity (c,) at which a contact must close before it carries force [m/s]: the extra gap of an ambiguous contact
+    # over the time of the step; None: zero.
+    closing: Array | None = None
+    order: VisitingOrder | None = None  # result of `order_contacts`
+
+
 def assemble(
     grains: Grains,
     motion: GrainMotion,
@@ -98,9 +107,7 @@ def assemble(
     contacts: Contacts,
     material: Material,
     impedance: Array,
-    *,
-    closing: Array | None = None,
-    order: VisitingOrder | None = None,
+    prepared: PreparedContacts | None = None,
 ) -> ContactProblem:
     """Assemble the contact problem of one frame or sub-step.
 
@@ -108,11 +115,8 @@ def assemble(
     ----------
     impedance : (n,)
         Impedance of every grain [N s/m].
-    closing : (c,), optional
-        Velocity at which a contact must close before it carries force [m/s]: the extra gap of an ambiguous contact over
-        the time of the step. Zero if absent.
-    order : VisitingOrder, optional
-        Result of `order_contacts`, if it is known.
+    prepared : PreparedContacts, optional
+        What is known of the contacts beforehand.
 
     Raises
     ------
@@ -140,6 +144,7 @@ def assemble(
         plate[walls.loaded, 0] = -walls.load[walls.loaded] * plate_compliance
         plate[walls.loaded, 1] = plate_compliance
 
+    closing, order = prepared or PreparedContacts()
     rows_pair, rows_wall, grouped = order_contacts(contacts) if order is None else order
     point, i, j = contacts.point, contacts.i, contacts.j
     closing = np.zeros(contacts.count) if closing is None else closing

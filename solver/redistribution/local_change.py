@@ -39,22 +39,29 @@ def limit_friction(
     enough = WITHIN * max(float(np.mean(np.abs(fn))), 1e-300)
     for row in np.argsort(-beyond, kind="stable").tolist():
         if np.abs(ft[row]) - friction[row] * fn[row] > enough:  # not solved beside another one
-            fn, ft = rebalance(grains, contacts, fn, ft, np.array([row]), friction=friction, reach=reach)
+            force, rows = np.stack([fn, ft]), np.array([row])
+            fn, ft = rebalance(grains, contacts, force, rows, friction=friction, reach=reach)
     return fn, ft
 
 
 def rebalance(
-    grains: Grains, contacts: Contacts, fn: Array, ft: Array, rows: NDArray[np.intp], *, friction: Array,
-    moved: Contacts | None = None, reach: int = 4,
-) -> tuple[Array, Array]:  # fmt: skip
-    """Return the nearest balanced forces (c,), (c,) around some contacts.
+    grains: Grains,
+    contacts: Contacts,
+    force: Array,
+    rows: NDArray[np.intp],
+    *,
+    friction: Array,
+    moved: Contacts | None = None,
+    reach: int = 4,
+) -> Array:
+    """Return the nearest balanced forces (2, c), f_n and f_t, around some contacts.
 
     Parameters
     ----------
     grains, contacts
         Bodies and contacts of the frame, for which the forces are in balance with what they carry.
-    fn, ft : (c,)
-        Forces [N].
+    force : (2, c)
+        f_n and f_t [N].
     rows
         Contacts that have changed.
     friction : (c,)
@@ -66,10 +73,10 @@ def rebalance(
     """
     touching, members = neighbourhood(grains, contacts, rows, reach)
     free = np.flatnonzero(touching)
-    given = np.concatenate([fn[free], ft[free]])
+    given = force[:, free].ravel()
     carried = resultants(grains, contacts, free, members) @ given
     matrix = resultants(grains, contacts if moved is None else moved, free, members)
-    scale = max(float(np.mean(np.abs(fn))), 1e-300)
-    new_fn, new_ft = fn.copy(), ft.copy()
-    new_fn[free], new_ft[free] = nearest_forces(matrix, carried, given, friction[free], scale).reshape(2, -1)
-    return new_fn, new_ft
+    scale = max(float(np.mean(np.abs(force[0]))), 1e-300)
+    changed = force.copy()
+    changed[:, free] = nearest_forces(matrix, carried, given, friction[free], scale).reshape(2, -1)
+    return changed

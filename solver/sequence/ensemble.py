@@ -22,7 +22,7 @@ from ..contacts.contacts import Contacts
 from ..contacts.pairs import are_among
 from ..convex.ensemble_members import NormalisedSlip, RefinedMotion, Slip, advance_convex_member, read_slip, steady_slip
 from ..convex.friction_estimate import relative_power_gap
-from ..convex.program import Balance, ConvexForces, assemble_balance, project_onto_equilibrium
+from ..convex.program import Balance, ConvexForces, LoadScale, assemble_balance, project_onto_equilibrium
 from ..detection.contact_networks import PairProbability, ProbabilityNetwork
 from ..detection.displacement import member_intervals
 from ..nlgs.chain import ChainStep, advance_chain_through, force_scale
@@ -273,8 +273,7 @@ def assemble_frame_balance(problem: FrameProblem, contacts: Contacts, soft: Chai
     return assemble_balance(
         contacts, packing.grains, walls, present=problem.snapshot.present,
         friction=packing.material.friction_at(contacts.with_wall),
-        force_unit=force_scale(packing, problem.settings.chain), gravity=packing.material.gravity,
-        wall_normal_total=wall_total,
+        scale=LoadScale(force_scale(packing, problem.settings.chain), packing.material.gravity, wall_total),
     )  # fmt: skip
 
 

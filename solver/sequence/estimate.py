@@ -26,6 +26,7 @@ from ..mixture.equilibrium_projection import project_mixed_field
 from ..mixture.frame_mixture import (
     ForceEstimate,
     Mixture,
+    Softness,
     limit_by_fringes,
     mix_on_contacts,
     motion_weight,
@@ -228,13 +229,13 @@ def _mix(
     assert estimate.fn_sd is not None
     assert estimate.ft_sd is not None
     field = ForceEstimate(estimate.fn, estimate.ft, estimate.fn_sd, estimate.ft_sd)
-    known, soft = problem.packing.scale_is_known, problem.settings.soft_trust if problem.settings.soft else None
-    weight = 1.0
+    softness = None
     if problem.settings.soft:
         seen = problem.settings.measured_overlap
         weight = motion_weight(positions.overlap, motion_scale(problem.motion, problem.snapshot.sigma)) if seen else 0.0
+        softness = Softness(problem.settings.soft_trust, weight)
     mixture = mix_on_contacts(
-        contacts, field, positions, reliability, scale_known=known, soft_trust=soft, weight=weight,
+        contacts, field, positions, reliability, scale_known=problem.packing.scale_is_known, softness=softness,
         position_weight=position_weight,
     )  # fmt: skip
     assert estimate.balance is not None

@@ -32,20 +32,27 @@ from .settings import SequenceSettings
 from .state import SequenceState
 
 
+@dataclass(frozen=True, slots=True)
+class SequencePart:
+    """Frames to be solved: from the first on, as far as they are requested."""
+
+    first: int = 0
+    # After the frames before the first, in order: of as many as the span of the settings; empty: nothing is solved yet.
+    states: Sequence[SequenceState] = ()
+    whole: bool = False  # all will be requested, so that the next block can be prepared concurrently
+
+
 def solve_sequence(
     packing: Packing,
     snapshots: Sequence[Snapshot],
     settings: SequenceSettings,
+    part: SequencePart | None = None,
     *,
-    state: SequenceState | None = None,
-    earlier: Sequence[SequenceState] = (),
-    first: int = 0,
     verdicts: Mapping[int, Verdicts] | None = None,
     failed: Mapping[int, str] | None = None,
     observer: Callable[[int, Exception], None] | None = None,
-    ahead: bool = False,
 ) -> Iterator[tuple[FrameForces, SequenceState]]:
-    """Solve the frames first, first + 1, … one after the other.
+    """Solve frames one after the other.
 
     The motion that leads to a frame is that since the last solved frame. Where the settings read sliding over a span of
     m photographs, it is that since frame k − m, whose forces the frame continues, but not from before a reset or a
@@ -58,20 +65,14 @@ def solve_sequence(
     snapshots : sequence of Snapshot
         Of all frames, with ascending times.
     settings : SequenceSettings
-    state : SequenceState, optional
-        After the frame before `first`; None: nothing is solved yet.
-    earlier : sequence of SequenceState
-        After the frames before that one, in order; as many as the span of the settings less one are used.
-    first : int
-        Frame to begin with.
+    part : SequencePart, optional
+        Frames to be solved; default: all, as far as they are requested.
     verdicts : mapping of int to Verdicts, optional
         Of reviewers, by frame.
     failed : mapping of int to str, optional
         Frames that are not to be solved, with the reason; unusable ones are added.
     observer : callable, optional
         Called with frame and exception where a frame cannot be solved.
-    ahead : bool
-        Whether all frames will be requested, so that the next block can be prepared concurrently.
 
     Yields
     ------
@@ -84,11 +85,11 @@ def solve_sequence(
     ValueError
         Times do not ascend.
     """
-    verdicts = {} if verdicts is None else verdicts
+    verdicts, part = {} if verdicts is None else verdicts, part or SequencePart()
     ready = _prepare(packing, snapshots, settings, verdicts, failed)
-    history = _History(ready.sequence, [*earlier, SequenceState.first(packing) if state is None else state])
-    blocks = _Blocks(ready.sequence, ahead=ahead)
-    for k in range(first, len(snapshots)):
+    history = _History(ready.sequence, [*part.states] or [SequenceState.first(packing)])
+    blocks = _Blocks(ready.sequence, ahead=part.whole)
+    for k in range(part.first, len(snapshots)):
         frame = following = None
         state = history.before(k)
         reason = ready.failed.get(k, "")

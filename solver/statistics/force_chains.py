@@ -68,8 +68,6 @@ def find_force_chains(
     present: NDArray[np.bool_],
     grains: Grains,
     length: float,
-    *,
-    greatest_angle: float = GREATEST_ANGLE,
 ) -> ForceChains:
     """Find the force chains of a frame, as defined at the head of this file.
 
@@ -87,8 +85,6 @@ def find_force_chains(
         Grains with their radii.
     length
         Length of the rods [m].
-    greatest_angle
-        Greatest angle between σ₁ of a grain and the line to the next one [rad].
     """
     n = contacts.grain_count
     major, axis = _principal_axes(symmetric_grain_stresses(contacts, fn, ft, position, grains, length))
@@ -98,7 +94,7 @@ def find_force_chains(
     normal = contacts.normal[row]
     at_i, at_j = np.einsum("ca,ca->c", normal, axis[i]), np.einsum("ca,ca->c", normal, axis[j])
     # A tolerance, so that rounding does not decide about links at exactly the greatest angle.
-    least = np.cos(greatest_angle) - 1e-12
+    least = np.cos(GREATEST_ANGLE) - 1e-12
     linked = stressed[i] & stressed[j] & (np.abs(at_i) >= least) & (np.abs(at_j) >= least)
     row, i, j, at_i, at_j = row[linked], i[linked], j[linked], at_i[linked], at_j[linked]
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from rodsight.process.atomic import write_atomically
-from rodsight.synthetic.synthesis import synthesize
+from rodsight.synthetic.synthesis import SynthesisSettings, synthesize
 
 from tests.benchmarks.history import PICTURE, ROOT
 from tests.benchmarks.tiled_packing import NOISE, tiled_packing
@@ -105,7 +105,10 @@ def walled_packing(folder: Path, rods: int, frames: int, **options: float) -> Pa
     if not (path / "experiment.toml").exists():
         print(f"simulating {path.name} …", file=sys.stderr, flush=True)
         synthesize(
-            path, preset="paper", grains=rods, frames=frames, photographs=False, noise=NOISE, seed=SEED, **options
+            path,
+            SynthesisSettings(
+                preset="paper", grains=rods, frames=frames, photographs=False, noise=NOISE, seed=SEED, **options
+            ),
         )
     return path
 

@@ -18,7 +18,7 @@ from rodsight.solver.bodies.grains import Array
 from rodsight.solver.convex.friction_estimate import FACTORS, SlidingFrame, estimate_friction
 from rodsight.solver.convex.interior_point import solve_program
 from rodsight.solver.convex.interior_point_kernels import Program
-from rodsight.solver.convex.program import Balance, ConvexSettings, assemble_balance
+from rodsight.solver.convex.program import Balance, ConvexSettings, LoadScale, assemble_balance
 from rodsight.solver.detection.position_network import PositionNetwork
 from rodsight.solver.detection.touch_probability import TouchCandidates
 
@@ -54,7 +54,7 @@ def sliding_frame(count: int) -> SlidingFrame:
     contacts = case.contacts
     balance = assemble_balance(
         contacts, case.grains, case.walls, present=np.ones(case.grains.count, bool),
-        friction=np.full(contacts.count, FRICTION), force_unit=case.mean_force,
+        friction=np.full(contacts.count, FRICTION), scale=LoadScale(case.mean_force),
     )  # fmt: skip
     some = 0.3 * np.random.default_rng(1).normal(size=contacts.count)
     force = solve_program(balance.grains, member_of(balance, some), SETTINGS.tolerance).force

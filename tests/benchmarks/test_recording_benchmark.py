@@ -38,7 +38,7 @@ from rodsight.recording.tabs.blueprint import RecordingLayout, make_blueprint
 from rodsight.recording.tabs.layout_property import send_layout
 from rodsight.recording.viewing.headless import PICTURE_INTERVAL, HeadlessViewer, vulkan_drivers
 from rodsight.solver.parallel import available_cores
-from rodsight.synthetic.synthesis import synthesize
+from rodsight.synthetic.synthesis import SynthesisSettings, synthesize
 
 pytestmark = pytest.mark.slow
 
@@ -57,7 +57,7 @@ ROUNDS = 3  # of runs with and without live view; the least time counts
 @pytest.fixture(scope="module")
 def experiment(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("benchmark") / "paper"
-    synthesize(folder, preset="paper", frames=FRAMES, photographs=False, noise=1e-5, seed=4)
+    synthesize(folder, SynthesisSettings(preset="paper", frames=FRAMES, photographs=False, noise=1e-5, seed=4))
     return folder
 
 
@@ -95,7 +95,7 @@ def test_a_recording_of_every_sweep_is_small_enough_to_send(experiment: Path, tm
 @pytest.mark.parametrize("estimator", ["ensemble", "nlgs"])
 def test_a_live_view_hardly_slows_the_solution(tmp_path: Path, preset: str, frames: int, estimator: str):
     folder = tmp_path / preset
-    made = synthesize(folder, preset=preset, frames=frames, photographs=False, noise=1e-5, seed=4)
+    made = synthesize(folder, SynthesisSettings(preset=preset, frames=frames, photographs=False, noise=1e-5, seed=4))
     settings = (f"solver.estimator={estimator}",)
     solving_seconds(folder, tmp_path / "first", settings, "none")  # compiles
     took = [

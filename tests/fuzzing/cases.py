@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from rodsight.synthetic.synthesis import synthesize
+from rodsight.synthetic.synthesis import SynthesisSettings, synthesize
 
 from .attempt import Case, attempt
 from .corruption import BYTES, NUMBERS, TABLE, TEXT, WORDS, Corruption, corrupt_store
@@ -35,8 +35,8 @@ class Originals:
 def make_originals(folder: Path) -> Originals:
     """Make one input of each kind."""
     tracked, photographed, dic, solved = (folder / name for name in ("tracked", "photographed", "dic", "solved"))
-    synthesize(tracked, grains=16, frames=3, photographs=False, noise=1e-5, seed=1)
-    synthesize(photographed, grains=12, frames=3, seed=2)
+    synthesize(tracked, SynthesisSettings(grains=16, frames=3, photographs=False, noise=1e-5, seed=1))
+    synthesize(photographed, SynthesisSettings(grains=12, frames=3, seed=2))
     text = (photographed / "experiment.toml").read_text()
     text = text.replace("[photographs]\n", '[photographs]\ncorrections = "corrections.csv"\n')
     (photographed / "experiment.toml").write_text(text)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from rodsight.synthetic.synthesis import synthesize
+from rodsight.synthetic.synthesis import SynthesisSettings, synthesize
 
 from tests.program import RODSIGHT
 
@@ -31,7 +31,7 @@ def peaks_of(
     """Measure and report the greatest memory of each command for these numbers of photographs [MB]."""
     base = work / "base"
     if not base.exists():
-        synthesize(base, grains=grains, frames=4, photographs=False, noise=1e-5, seed=1)
+        synthesize(base, SynthesisSettings(grains=grains, frames=4, photographs=False, noise=1e-5, seed=1))
     peaks: dict[str, list[float]] = {name: [] for name in (*FRAMES_TO_WRITE, "review", "open")}
     for count in counts:
         root = work / f"{count}"

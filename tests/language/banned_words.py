@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tokenize
 from collections.abc import Iterator, Sequence
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -81,6 +82,7 @@ EXCEPTIONS = (
 COMMENT_OPENS = re.compile(r"^#\s*what\b", re.IGNORECASE)
 
 _PROSE = {re.compile(rf"(?<!\w)(?:{pattern})(?!\w)", re.IGNORECASE): word for pattern, word in BANNED.items()}
+_ANY = re.compile(rf"(?<!\w)(?:{'|'.join(BANNED)})(?!\w)", re.IGNORECASE)  # one search for most lines
 _PARTS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 
 
@@ -126,17 +128,22 @@ def _find_in(name: str) -> Iterator[Place]:
 
 
 def _in_prose(name: str, number: int, line: str) -> Iterator[Place]:
-    for pattern, instead in _PROSE.items():
+    for pattern, instead in _PROSE.items() if _ANY.search(line) else ():
         for found in pattern.finditer(line):
             yield Place(name, number, found.group(0), instead, line.strip())
 
 
 def _in_name(name: str, number: int, identifier: str) -> Iterator[Place]:
-    if identifier in BANNED_IDENTIFIERS:
-        yield Place(name, number, identifier, "see words", identifier)
-    for part in (each.lower() for each in _PARTS.findall(identifier)):
-        if part in BANNED_NAMES:
-            yield Place(name, number, part, BANNED_NAMES[part], identifier)
+    for word, instead in _banned_parts(identifier):
+        yield Place(name, number, word, instead, identifier)
+
+
+@cache
+def _banned_parts(identifier: str) -> tuple[tuple[str, str], ...]:
+    """Banned words in an identifier, with what is written instead."""
+    whole = ((identifier, "see words"),) if identifier in BANNED_IDENTIFIERS else ()
+    parts = (each.lower() for each in _PARTS.findall(identifier))
+    return whole + tuple((part, BANNED_NAMES[part]) for part in parts if part in BANNED_NAMES)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ class Mutant:
     def locate(self, root: Path) -> Path:
         """The file that the text stands in, relative to the root of a tree."""
         place = root / self.place
-        files = [place] if place.suffix else sorted(place.rglob("*.py"))
+        files = [each for each in ([place] if place.suffix else sorted(place.rglob("*.py"))) if each.is_file()]
         found = [file for file in files for _ in range(file.read_text(encoding="utf-8").count(self.old))]
         if len(found) != 1:
             raise StaleMutantError(f"{self.place}: {self.old!r} is found {len(found)} times, not once")

@@ -1,13 +1,16 @@
 """Apply every mutant to a copy of the tree, run the nearest tests there, and report the mutants that survive.
 
-The copy keeps the files' times, so that kernels without a mutant are found in the caches of compiled code. A mutant of
-a kernel is run without compilation: the caches of its callers would hide it otherwise. Every run is a fork of one
-process that has imported the external libraries, which takes longer than most tests.
+The copy keeps the files' times and has a copy of the compiled kernels, which all mutants outside of kernels share: the
+program would compile all of them anew for every other file that they import. A mutant of a kernel is run without
+compilation: the kernels of its callers would hide it otherwise. So could those that contain a constant: a survivor of
+a file that kernels import is tried again with kernels of its own. Every run is a fork of one process that has imported
+the external libraries, which takes longer than most tests.
 """
 
 from __future__ import annotations
 
 import ast
+import hashlib
 import multiprocessing
 import os
 import shutil
@@ -16,6 +19,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
+
+from rodsight.process.kernel_cache import kernel_folder
+from rodsight.process.sources import program_sources
 
 from tests.mutation.mutant import Mutant
 
@@ -27,7 +33,11 @@ PRELOADED = (
     "numpy", "numba", "scipy.spatial", "scipy.sparse.csgraph", "scipy.linalg", "scipy.stats", "scipy.ndimage",
     "h5py", "clarabel", "cv2", "pydantic", "pytest", "playwright.sync_api",
 )  # fmt: skip
+KERNELS = Path(
+    "kernels", "rodsight-kernels-of-all-mutants"
+)  # beside the copy; the prefix marks a choice of the program
 TIME_LIMIT = 300.0  # seconds; a mutant that exceeds it is killed
+COMPILING = 900.0  # seconds beside it, where all kernels are compiled first
 MAX_SURVIVAL = 0.10  # fraction of the mutants that may survive
 
 
@@ -63,7 +73,10 @@ def judge(mutant: Mutant, file: Path, tree: Path) -> Verdict:
     text = (tree / file).read_text(encoding="utf-8")
     (tree / file).write_text(text.replace(mutant.old, mutant.new), encoding="utf-8")
     try:
-        code, result = run_tests(tree, mutant.tests, compile_kernels=not in_kernel(ROOT / file, mutant.old))
+        interpreted = in_kernel(ROOT / file, mutant.old)
+        code, result = run_tests(tree, mutant.tests, compile_kernels=not interpreted)
+        if code == 0 and not interpreted and is_compiled_in(file):
+            code, result = run_tests(tree, mutant.tests, compile_kernels=True, own_kernels=True)
     finally:
         shutil.copy2(ROOT / file, tree / file)
     if code > 1:  # neither passed nor failed: no test was run at all
@@ -78,7 +91,35 @@ def copy_tree(folder: Path) -> Path:
             shutil.copytree(ROOT / name, folder / name)
         else:
             shutil.copy2(ROOT / name, folder / name)
+    copy_kernels(folder)
     return folder
+
+
+def copy_kernels(tree: Path) -> None:
+    """Copy the compiled kernels of this tree to where those of the copy are looked for."""
+    (tree / KERNELS).mkdir(parents=True)
+    kept = kernel_folder()
+    for file in program_sources().compiled if kept else ():
+        source = source_of(file).parent
+        there = kept / cache_name(ROOT / source)
+        if there.is_dir() and not (tree / KERNELS / cache_name(tree / source)).exists():
+            shutil.copytree(there, tree / KERNELS / cache_name(tree / source))
+
+
+def cache_name(folder: Path) -> str:
+    """The name that the compiler gives to the kernels of a folder of sources, see `folder_of_sources`."""
+    return f"{folder.name}_{hashlib.sha1(str(folder).encode()).hexdigest()}"
+
+
+def source_of(name: str) -> Path:
+    """The file of the tree with a name in the package, such as tracking/tracker.py."""
+    return Path(name) if name.startswith("solver/") else Path("app", name)
+
+
+def is_compiled_in(file: Path) -> bool:
+    """Whether kernels may contain something of a file: one of their own files, or one that these import."""
+    sources = program_sources()
+    return any(source_of(name) == file for name in sources.needed_by(sources.compiled))
 
 
 def in_kernel(file: Path, text: str) -> bool:
@@ -93,14 +134,14 @@ def in_kernel(file: Path, text: str) -> bool:
     return True
 
 
-def run_tests(tree: Path, tests: Sequence[str], *, compile_kernels: bool) -> tuple[int, str]:
+def run_tests(tree: Path, tests: Sequence[str], *, compile_kernels: bool, own_kernels: bool = False) -> tuple[int, str]:
     """Return pytest's exit code and the test that failed; without compilation, of unit tests alone."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(list(PRELOADED))
     report = tree / "report.txt"
-    run = context.Process(target=_run_here, args=(tree, tuple(tests), compile_kernels, report))
+    run = context.Process(target=_run_here, args=(tree, tuple(tests), compile_kernels, own_kernels, report))
     run.start()
-    run.join(TIME_LIMIT)
+    run.join(TIME_LIMIT + (COMPILING if own_kernels else 0.0))
     if run.is_alive():
         run.kill()
         run.join()
@@ -111,7 +152,7 @@ def run_tests(tree: Path, tests: Sequence[str], *, compile_kernels: bool) -> tup
     return run.exitcode or 0, last.removeprefix("FAILED ").split(" - ")[0]
 
 
-def _run_here(tree: Path, tests: Sequence[str], compile_kernels: bool, report: Path) -> None:
+def _run_here(tree: Path, tests: Sequence[str], compile_kernels: bool, own_kernels: bool, report: Path) -> None:
     """Run the tests in a process that imports from the copy of the tree."""
     import numba
     import pytest
@@ -126,6 +167,11 @@ def _run_here(tree: Path, tests: Sequence[str], compile_kernels: bool, report: P
     sys.path[:] = [str(tree / ".editable"), str(tree), *external]
     os.environ["PYTHONPATH"] = os.pathsep.join(sys.path[:2])
     os.chdir(tree)
+    os.environ["NUMBA_CACHE_DIR"] = str(tree / KERNELS.parent)
+    import rodsight  # noqa: F401  which chooses a folder there for the kernels of exactly these sources
+
+    if not own_kernels:
+        os.environ["NUMBA_CACHE_DIR"] = numba.config.CACHE_DIR = str(tree / KERNELS)
     options = ["-x", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=no", "--hypothesis-profile=mutants", *tests]
     if not compile_kernels:
         numba.config.DISABLE_JIT = True

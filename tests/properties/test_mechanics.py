@@ -9,7 +9,7 @@ from rodsight.solver.bodies.packing import Material
 from rodsight.solver.bodies.walls import Walls
 from rodsight.solver.contacts.contacts import detect_contacts
 from rodsight.solver.contacts.kinematics import equilibrium_matrix, external_load, relative_motion
-from rodsight.solver.nlgs.problem import assemble
+from rodsight.solver.nlgs.problem import PreparedContacts, assemble
 from rodsight.solver.nlgs.solve import NlgsSettings, solve
 from rodsight.solver.statistics.fabric import anisotropies, contact_fabric, fabric_anisotropy
 from rodsight.solver.statistics.stress import (
@@ -117,7 +117,7 @@ def test_forces_scale_with_load_and_motion_bit_for_bit(power):
         motion = GrainMotion(MOTION.position, factor * MOTION.velocity, factor * MOTION.spin, MOTION.present)
         walls = Walls(WALLS.endpoints, np.full((4, 2, 2), factor * 1e-6), factor * WALLS.load)
         material = Material(0.3, 0.2, gravity=(0.0, -9.81 * factor))
-        problem = assemble(GRAINS, motion, walls, CONTACTS, material, impedance, closing=factor * closing)
+        problem = assemble(GRAINS, motion, walls, CONTACTS, material, impedance, PreparedContacts(factor * closing))
         return solve(problem, NlgsSettings(sweeps=12)).force
 
     assert np.array_equal(forces(scale), scale * forces(1.0))

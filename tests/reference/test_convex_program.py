@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from rodsight.solver.contacts.contacts import Contacts
 from rodsight.solver.convex import interior_point
-from rodsight.solver.convex.friction_check import _sliding_frame
+from rodsight.solver.convex.friction_check import sliding_frame
 from rodsight.solver.convex.interior_point import Termination, solve_program
 from rodsight.solver.convex.interior_point_kernels import Program
-from rodsight.solver.convex.program import Balance, ConvexSettings, assemble_balance
+from rodsight.solver.convex.program import Balance, ConvexSettings, LoadScale, assemble_balance
 from rodsight.solver.detection.touch_probability import ContactProbabilitySettings
 
 from tests.golden.forces import packing_of, stored_poses
@@ -80,9 +80,9 @@ def balance_of(situation: Situation, contacts: Contacts) -> Balance:
     plate = CASE.walls.plate if np.isfinite(situation.load[2]) else None  # a disc is fixed to the wall on top
     walls = replace(CASE.walls, load=np.append(situation.load, NAN), plate=plate)
     return assemble_balance(
-        contacts, CASE.grains, walls, present=CASE.motion.present, gravity=situation.gravity, force_unit=UNIT,
+        contacts, CASE.grains, walls, present=CASE.motion.present,
+        scale=LoadScale(UNIT, situation.gravity, situation.wall_total),
         friction=np.where(contacts.with_wall, situation.wall_friction, situation.friction),
-        wall_normal_total=situation.wall_total,
     )  # fmt: skip
 
 
@@ -135,7 +135,7 @@ def test_the_packing_has_what_makes_programs_difficult():
 @pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
 def test_forces_are_the_same_at_the_frames_of_a_simulation(k: int, factor: float):
     packing, snapshots = packing_of(stored_poses())
-    frame = _sliding_frame(packing, snapshots, k, UNIT, ContactProbabilitySettings(overlap=5e-6))
+    frame = sliding_frame(packing.at_frame(snapshots, k), snapshots, k, UNIT, ContactProbabilitySettings(overlap=5e-6))
     balance = replace(frame.balance, friction=factor * frame.balance.friction)
     cost = np.column_stack([balance.friction * np.abs(frame.slip), frame.slip])
     program = Program(balance.friction, cost, np.zeros_like(cost), SETTINGS.history, SETTINGS.balance)

@@ -30,7 +30,7 @@ def edge_points(seed=3):
 @pytest.mark.parametrize("scatter", [np.inf, 0.05])
 def test_a_fitted_circle_is_a_fixed_point_of_the_plain_step(scatter):
     angle, distance, weight, (ex, ey, radius) = edge_points()
-    found = fit_circle(0.0, 0.0, 24.3, angle, distance, weight, radius_sd=scatter, min_scale=0.02)
+    found = fit_circle((0.0, 0.0, 24.3), angle, distance, weight, radius_sd=scatter, min_scale=0.02)
     shift = np.array([found.x, found.y, found.radius - 24.3])
     step, residual, weights = circle_step(angle, distance, weight, 24.3, shift, scatter, 0.02)
     assert np.abs(step).max() < CONVERGED
@@ -55,7 +55,7 @@ def test_a_rim_fit_is_the_plain_one():
     start = edges + rng.uniform(-0.3, 0.3, 6)
     start[4] = np.nan
     angle = np.linspace(0.0, 5.0, 6)
-    edge, level, misfit, dark = locate_edges(rays, first, step, start, angle, width, extent=width, rounds=1)
+    edge, level, misfit, dark = locate_edges(rays, (first, step), start, angle, width, extent=width, rounds=1)
     assert np.isnan(edge).tolist() == [False] * 4 + [True] * 2
     for p in range(4):
         assert dark[p] == pytest.approx(rays[p][(r > start[p] + 1.0) & (r <= start[p] + 2.4)].min(), abs=1.0)

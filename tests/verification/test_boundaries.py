@@ -6,7 +6,7 @@ from rodsight.solver.bodies.motion import Snapshot, no_motion
 from rodsight.solver.bodies.packing import Material, Packing
 from rodsight.solver.bodies.walls import Walls
 from rodsight.solver.contacts.contacts import detect_contacts
-from rodsight.solver.convex.program import assemble_balance, project_onto_equilibrium
+from rodsight.solver.convex.program import LoadScale, assemble_balance, project_onto_equilibrium
 from rodsight.solver.detection.contact_networks import ThresholdNetwork
 from rodsight.solver.nlgs.chain import ChainSettings, advance_chain
 from rodsight.solver.nlgs.force_memory import ForceMemory
@@ -84,7 +84,7 @@ def test_projected_forces_balance_every_plate():
     present = np.ones(6, bool)
     contacts = detect_contacts(grains, position, present, walls, 1e-9)
     balance = assemble_balance(
-        contacts, grains, walls, present=present, friction=np.full(contacts.count, 0.3), force_unit=10.0
+        contacts, grains, walls, present=present, friction=np.full(contacts.count, 0.3), scale=LoadScale(10.0)
     )
     given = np.full(contacts.count, 9.0)
     found = project_onto_equilibrium(balance, given, np.zeros(contacts.count))

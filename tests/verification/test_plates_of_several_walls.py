@@ -10,7 +10,7 @@ from rodsight.solver.bodies.wall_shapes import OUT, STRAIGHT
 from rodsight.solver.bodies.walls import Walls
 from rodsight.solver.contacts.contacts import detect_contacts
 from rodsight.solver.contacts.kinematics import equilibrium_matrix, external_load
-from rodsight.solver.convex.program import assemble_balance, project_onto_equilibrium
+from rodsight.solver.convex.program import LoadScale, assemble_balance, project_onto_equilibrium
 from rodsight.solver.nlgs.problem import assemble
 from rodsight.solver.nlgs.solve import NlgsSettings, solve
 
@@ -72,7 +72,7 @@ def test_every_method_has_the_same_equilibrium():
     assert row == pytest.approx(np.concatenate([contacts.normal[:, 1] * on, contacts.tangent[:, 1] * on]))
     assert external_load(grains.weight((0.0, 0.0)), walls)[-1] == LOAD
     balance = assemble_balance(
-        contacts, grains, walls, present=np.ones(3, bool), friction=np.full(contacts.count, 0.3), force_unit=LOAD
+        contacts, grains, walls, present=np.ones(3, bool), friction=np.full(contacts.count, 0.3), scale=LoadScale(LOAD)
     )
     uniform = np.full(contacts.count, LOAD / 3.0)
     found = project_onto_equilibrium(balance, uniform, np.zeros(contacts.count))

@@ -181,7 +181,7 @@ def study(
             study_accuracy(seeds, grains=grains, folder=out, estimator=estimator, console=console, progress=progress)
         elif subject == "uncertainty":
             study_uncertainty(
-                seeds[:half], seeds[half:], members=8 if ensemble is None else ensemble, grains=grains,
+                (seeds[:half], seeds[half:]), members=8 if ensemble is None else ensemble, grains=grains,
                 estimator=estimator, folder=out, console=console, progress=progress,
             )  # fmt: skip
         elif subject == "status":
@@ -224,7 +224,7 @@ def _study_perturbation(experiment: Path | None, request: _StudyRequest) -> int:
 def _study_programs(experiment: Path | None, request: _StudyRequest, grains: int) -> int:
     from ... import pipeline
     from ...study.program_comparison import RecipeScore, compare_programs, mean_scores, print_programs
-    from ...synthetic.synthesis import synthesize
+    from ...synthetic.synthesis import SynthesisSettings, synthesize
 
     def score(folder: Path, out: Path | None) -> list[RecipeScore]:
         with open_run(Request(folder, request.plan.settings, request.quiet, out)) as run:
@@ -243,9 +243,17 @@ def _study_programs(experiment: Path | None, request: _StudyRequest, grains: int
         if not (folder / "experiment.toml").exists():
             with progress_of(request.quiet) as progress:
                 synthesize(
-                    folder, preset="1g2e", seed=seed, photographs=False, grains=grains, frames=APPARATUS_FRAMES,
-                    radius_error=APPARATUS_RADIUS_ERROR, progress=progress,
-                )  # fmt: skip
+                    folder,
+                    SynthesisSettings(
+                        preset="1g2e",
+                        seed=seed,
+                        photographs=False,
+                        grains=grains,
+                        frames=APPARATUS_FRAMES,
+                        radius_error=APPARATUS_RADIUS_ERROR,
+                    ),
+                    progress=progress,
+                )
         found.append(score(folder, folder.with_name(f"{folder.name}_run")))
     title = (
         f"Apparatus 1γ2ε, {grains} rods, radii 2 % too small, noise 10 µm, seeds {' '.join(map(str, request.seeds))}"

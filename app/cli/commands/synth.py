@@ -63,16 +63,29 @@ def synth(
     Example: rodsight synth my_test --preset small --seed 3
     """
     from ...synthetic.scenarios.scenario_folder import make_scenario
-    from ...synthetic.synthesis import synthesize
+    from ...synthetic.synthesis import SynthesisSettings, synthesize
 
     with _at_rest(out), progress_of(quiet) as progress:
         if preset in ("small", "paper", "1g2e"):
             made = synthesize(
-                out, progress=progress, preset=preset, seed=seed, photographs=photographs, noise=noise,
-                depth=depth, jpeg_quality=jpeg_quality, png=png, grains=grains, frames=frame_count,
-                step_degrees=step_degrees, pixel_size=pixel_size, reversal=reversal,
-                radius_error=radius_error,
-            )  # fmt: skip
+                out,
+                SynthesisSettings(
+                    preset=preset,
+                    seed=seed,
+                    photographs=photographs,
+                    noise=noise,
+                    depth=depth,
+                    jpeg_quality=jpeg_quality,
+                    png=png,
+                    grains=grains,
+                    frames=frame_count,
+                    step_degrees=step_degrees,
+                    pixel_size=pixel_size,
+                    reversal=reversal,
+                    radius_error=radius_error,
+                ),
+                progress=progress,
+            )
         else:
             refused = {
                 "--photographs": photographs and preset not in ("photoelastic", "fringes"),

@@ -47,7 +47,7 @@ def use_size_classes(material: RodMaterial, tracks: Tracks) -> tuple[Tracks, str
     """
     if material.stiffness in (None, "rigid") or tracks.grain_count == 0:
         return tracks, ""
-    found = find_size_classes(np.where(tracks.present[..., None], tracks.position, np.nan), tracks.radius)
+    found = find_size_classes(tracks.position, tracks.radius)
     return (tracks, "") if found is None else (replace(tracks, radius=found.radius), found.describe())
 
 
@@ -131,7 +131,7 @@ def find_wrong_sizes(tracks: Tracks, walls: WallTracks | None, failed: Collectio
     With d_c the mean overlap of the pairs of size c, these are sizes with d_c > max(min d / UNEQUAL, SEEN · 2 r_c).
     """
     sizes = radius_classes(tracks.radius)
-    if sizes is None or sizes.max() < 1:
+    if sizes is None:
         return {}
     grains, depth, of_size = RodMaterial().pack(tracks.radius, np.empty(0)).grains, [], []
     for k in sorted(set(range(tracks.frame_count)) - set(failed)):

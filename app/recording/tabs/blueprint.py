@@ -144,7 +144,7 @@ def _forces(layout: RecordingLayout, name: str = Tab.FORCES) -> rrb.Container:
     photograph = [entities.PHOTOGRAPH] if layout.photographs else []
     angles = [entities.FRICTION_ANGLE, entities.WALL_RATIO_ANGLE]
     curves = rrb.Horizontal(
-        curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=_UNIT_RANGE, corner=_LOW),
+        curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], _UNIT_RANGE, corner=_LOW),
         curve_view("Friction angle [°]", angles, layout.extremes, height=240.0),
     )
     walls = wall_force_views(layout.extremes, layout.wall_count, recorded=layout.wall_forces)
@@ -198,14 +198,14 @@ def _convergence(layout: RecordingLayout) -> rrb.Container:
     indicators = [entities.CORRECTION, entities.OLD_UNBALANCE, entities.START_DIFFERENCE]
     low, high = layout.extremes.get(entities.SWEEP_COUNT, (0.0, 1.0))
     plots: list[rrb.View] = [
-        curve_view("log₁₀ residuals of sweeps, or reported", [*residuals, entities.TOLERANCE], y_range=(-6.4, 4.4),
+        curve_view("log₁₀ residuals of sweeps, or reported", [*residuals, entities.TOLERANCE], (-6.4, 4.4),
                    axis=near_axis()),
-        curve_view("log₁₀ residuals: starts and reported field", starts, y_range=_RESIDUALS),
+        curve_view("log₁₀ residuals: starts and reported field", starts, _RESIDUALS),
         curve_view("Settling: ε, ū and H", indicators, layout.extremes, height=230.0),
         curve_view("Sweeps saved by the former forces", [entities.SAVED_SWEEPS]),
     ]  # fmt: skip
     if layout.budget:
-        plots[3] = curve_view("Fractions of the error's variance", [entities.ERROR_BUDGET], y_range=_UNIT_RANGE,
+        plots[3] = curve_view("Fractions of the error's variance", [entities.ERROR_BUDGET], _UNIT_RANGE,
                               entries=6)  # fmt: skip
     elif high > low:  # no curve for a constant number
         plots.append(curve_view("Sweeps per frame", [entities.SWEEP_COUNT], layout.extremes))
@@ -310,8 +310,7 @@ def _kinematics(layout: RecordingLayout) -> rrb.Container:
         rrb.Horizontal(*views),
         rrb.Horizontal(
             lanes_view(),
-            curve_view("Participation of the local shear; 1: homogeneous", [entities.PARTICIPATION],
-                       y_range=_UNIT_RANGE),
+            curve_view("Participation of the local shear; 1: homogeneous", [entities.PARTICIPATION], _UNIT_RANGE),
             curve_view("Mean local solid fraction", [entities.SOLID_FRACTION]),
         ),
         row_shares=[2.4, 1.0],
@@ -345,7 +344,7 @@ def _truth(layout: RecordingLayout) -> rrb.Container:
         ),
         rrb.Horizontal(
             drawn_view("f_n: inferred over true", "/truth/scatter", (-60.0, 425.0), (-15.0, 455.0)),
-            curve_view("Agreement with the truth, and trust", agreement, y_range=(-0.5, 1.05), corner=_LOW, entries=4),
+            curve_view("Agreement with the truth, and trust", agreement, (-0.5, 1.05), corner=_LOW, entries=4),
             column_shares=[1.0, 1.6],
         ),
         row_shares=[1.8, 1.0],

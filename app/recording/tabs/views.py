@@ -113,9 +113,8 @@ def wall_force_views(extremes: Extremes, walls: int, *, recorded: bool) -> list[
 def curve_view(
     name: str,
     contents: list[str],
-    extremes: Extremes | None = None,
+    span: Extremes | tuple[float, float] | None = None,
     *,
-    y_range: tuple[float, float] | None = None,
     height: float = PLOT_HEIGHT,
     entries: int | None = None,
     corner: rrb.Corner2D = rrb.Corner2D.RightTop,
@@ -129,10 +128,8 @@ def curve_view(
         Title of the view.
     contents : list of str
         Paths of the curves.
-    extremes : mapping, optional
-        Least and greatest values of the curves, for an axis with space for the legend.
-    y_range : tuple of float, optional
-        Range of the axis, instead of that from `extremes`.
+    span : mapping or tuple of float, optional
+        Least and greatest values of the curves, for an axis with space for the legend; or the range of the axis.
     height : float
         Height of the plot in a window of usual size [px].
     entries : int, optional
@@ -146,8 +143,9 @@ def curve_view(
     if entries is None:
         entries = len(contents) if len(contents) > 1 else 0
     contents = [*bands, *contents]
-    if y_range is None:
-        y_range = range_with_legend(extremes or {}, contents, entries=entries, height=height, top=corner in _TOP)
+    y_range = span if isinstance(span, tuple) else None
+    if not isinstance(span, tuple):
+        y_range = range_with_legend(span or {}, contents, entries=entries, height=height, top=corner in _TOP)
     return rrb.TimeSeriesView(
         origin="/",
         contents=contents,

@@ -25,7 +25,7 @@ from ...solver.bodies.packing import Packing
 from ...solver.bodies.walls import Walls
 from ...solver.contacts.contacts import Contacts, ContactSource, measure_pairs
 from ...solver.contacts.pairs import Keys, join_keys, match_values, split_keys
-from ...solver.convex.program import assemble_balance, project_onto_equilibrium
+from ...solver.convex.program import LoadScale, assemble_balance, project_onto_equilibrium
 from ...solver.detection.precision import measure_precision
 from ...solver.statistics.agreement import compare_forces, pearson
 from ...solver.statistics.balance import sum_on_grains
@@ -233,8 +233,8 @@ def _nearest_equilibrium(
     inner = snapshot.present & _enclosed(_measure(packing, snapshot, between), n)
     balance = assemble_balance(
         contacts, grains, Walls.at_rest(np.empty((0, 2, 2))), present=inner,
-        friction=packing.material.friction_at(contacts.with_wall), force_unit=float(fn[fn > 0.0].mean()),
-        gravity=packing.material.gravity, wall_normal_total=float(fn[contacts.gauge].sum()),
+        friction=packing.material.friction_at(contacts.with_wall),
+        scale=LoadScale(float(fn[fn > 0.0].mean()), packing.material.gravity, float(fn[contacts.gauge].sum())),
     )  # fmt: skip
     found = project_onto_equilibrium(balance, fn, np.zeros(contacts.count))
     if not found.converged:

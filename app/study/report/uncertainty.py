@@ -47,8 +47,7 @@ class ErrorBars:
 
 
 def study_uncertainty(
-    seeds: Sequence[int],
-    held_out: Sequence[int],
+    seeds: tuple[Sequence[int], Sequence[int]],
     *,
     members: int,
     grains: int,
@@ -57,11 +56,12 @@ def study_uncertainty(
     console: Console,
     progress: Progress = no_progress,
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Fit on the packings `seeds`, judge on `held_out`, and print coverages and the constants of f_n and f_t.
+    """Fit on some packings, judge on others, and print coverages and the constants of f_n and f_t.
 
     Parameters
     ----------
-    seeds, held_out : sequence of int
+    seeds : tuple of sequence of int
+        Of the packings of the fit, and of those held out.
     members : int
         Ensemble members of each window.
     grains : int
@@ -77,7 +77,7 @@ def study_uncertainty(
         a and b of σ² = (a S)² + (b s)² for f_n and f_t.
     """
     samples = []
-    for some in (seeds, held_out):
+    for some in seeds:
         truths = [simulate(seed, grains=grains, folder=folder, progress=progress) for seed in some]
         samples.append(measure_error_bars(truths, members, estimator, progress=progress))
     fit = (fit_sd_weights(samples[0], 0), fit_sd_weights(samples[0], 1))

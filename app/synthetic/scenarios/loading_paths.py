@@ -12,7 +12,7 @@ from ...process.progress import Progress, no_progress
 from ...solver.bodies.grains import Array
 from ...solver.dem.dem_truth import DemFrame, DemSettings, DemTruth
 from ...solver.dem.ring_cell import CIRCLE_NAMES, CIRCLE_SIDES, RingCell
-from ...solver.dem.shear_cell import ShearCell, shear_photographs
+from ...solver.dem.shear_cell import FrameSize, ShearCell, shear_photographs
 from ..dense_packing import choose_radii, prepare_packing
 from ..placement import cut_sides, place_in_picture, tilt_box
 from ..ring_packing import prepare_ring
@@ -196,9 +196,8 @@ def _prepare(loading: LoadingPath, grains: int, rng: np.random.Generator) -> She
     if loading.motion in (shear, shear_cyclically):
         return cell
     packed = ShearCell(
-        cell.grains.radius, cell.position, width=cell.width, height=cell.height, settings=loading.settings,
-        span=SPAN * cell.width,
-    )  # fmt: skip
+        cell.grains.radius, cell.position, FrameSize(cell.width, cell.height, SPAN * cell.width), loading.settings
+    )
     packed.rest()
     if not (loading.plates or loading.measured):
         packed.load(top=np.nan)
@@ -210,9 +209,11 @@ def _prepare_heap(loading: LoadingPath, grains: int, rng: np.random.Generator) -
     light = replace(loading.settings, pressure=HEAP_PRESSURE, gravity=(0.0, 0.0))
     cell = prepare_packing(grains, rng, light, aspect=0.8, sizes=loading.sizes)
     heap = ShearCell(
-        cell.grains.radius, cell.position, width=cell.width, height=BOX_HEIGHT * cell.height, settings=loading.settings,
-        span=SPAN * cell.width,
-    )  # fmt: skip
+        cell.grains.radius,
+        cell.position,
+        FrameSize(cell.width, BOX_HEIGHT * cell.height, SPAN * cell.width),
+        loading.settings,
+    )
     for _ in range(RESTS):
         heap.rest()
         if heap.unbalance < loading.settings.rest:

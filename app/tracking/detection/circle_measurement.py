@@ -141,7 +141,7 @@ class CircleMeasurer:
         if seen.sum() < self._min_points(outline) or outline.in_view.mean() < self._min_view(radius):
             return MeasuredCircle(x, y, radius, np.nan, 0.0)
         steepest = fit_circle(
-            x, y, radius + shift, outline.angle[seen], outline.distance[seen],
+            (x, y, radius + shift), outline.angle[seen], outline.distance[seen],
             np.minimum(outline.strength[seen] / (SURE_SLOPE * local), 1.0) ** 2, radius_sd=np.inf, min_scale=0.1,
         )  # fmt: skip
         edge, level, _, dark = _fit_profiles(outline, seen, width, width)
@@ -151,7 +151,7 @@ class CircleMeasurer:
         excess = (dark[good] - lowest_tenth(dark[good])) / (DARK_EXCESS * local)
         weight = (np.minimum(level[good] / (0.6 * local), 1.0) * np.clip(1.0 - excess, 0.05, 1.0)) ** 2
         circle = fit_circle(
-            x, y, radius + shift, outline.angle[good], edge[good], weight, radius_sd=radius_sd, min_scale=0.05
+            (x, y, radius + shift), outline.angle[good], edge[good], weight, radius_sd=radius_sd, min_scale=0.05
         )
         moved = np.hypot(circle.x - steepest.x, circle.y - steepest.y) / np.sqrt(2.0)
         found = _measured(circle, outline, shift)
@@ -218,7 +218,7 @@ def _fit_profiles(
     outline: Outline, seen: NDArray[np.bool_], width: float, extent: float
 ) -> tuple[Array, Array, Array, Array]:
     start = np.where(seen, outline.distance, np.nan)
-    return locate_edges(outline.rays, outline.first, 1.0 / DENSITY, start, outline.angle, width, extent=extent)
+    return locate_edges(outline.rays, (outline.first, 1.0 / DENSITY), start, outline.angle, width, extent=extent)
 
 
 def _measured(circle: Circle, outline: Outline, shift: float) -> MeasuredCircle:

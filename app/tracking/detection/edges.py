@@ -147,9 +147,7 @@ class Circle:
 
 
 def fit_circle(
-    x: float,
-    y: float,
-    radius: float,
+    rough: tuple[float, float, float],
     angle: Array,
     distance: Array,
     weight: Array,
@@ -161,8 +159,8 @@ def fit_circle(
 
     Parameters
     ----------
-    x, y, radius : float
-        Rough circle [px].
+    rough : tuple of float
+        Circle x, y, radius [px] to start from.
     angle, distance : (p,) array
         Points about (x, y) [rad, px].
     weight : (p,) array
@@ -178,6 +176,7 @@ def fit_circle(
     (1 − (r / (4.685 s))²)², s: 1.4826 times the median of |r|. The centre's variance is the sandwich estimate
     H⁻¹ (Σ g gᵀ) H⁻¹ with the scores g summed over arcs of the outline, because one dot of paint affects several points.
     """
+    x, y, radius = rough
     # Start from the points' own radius: with a common shift they would all be outliers.
     start = weighted_median(distance - radius, weight) if np.isinf(radius_sd) else 0.0
     residual, w = np.empty_like(distance), np.empty_like(distance)

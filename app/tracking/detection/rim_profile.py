@@ -38,16 +38,23 @@ FAR = 6.0  # widths of the blur beyond which an edge is neglected: 1e-9 of it re
 
 
 def locate_edges(
-    rays: Image, first: float, step: float, start: Array, angle: Array, width: float, *, extent: float, rounds: int = 3
+    rays: Image,
+    distances: tuple[float, float],
+    start: Array,
+    angle: Array,
+    width: float,
+    *,
+    extent: float,
+    rounds: int = 3,
 ) -> tuple[Array, Array, Array, Array]:
     """Fit the profile to every ray.
 
     Parameters
     ----------
     rays : (p, s) array
-        Grey values at the distances first + step · k [px].
-    first, step : float
-        Those distances [px].
+        Grey values on the rays.
+    distances : tuple of float
+        First distance of a ray from the centre, and the step from one to the next [px].
     start : (p,) array
         Rough edges [px]; NaN without an edge.
     angle : (p,) array
@@ -68,7 +75,7 @@ def locate_edges(
     -----
     I(r) = B + A Φ(t) + C s (t Φ(t) + φ(t)), t = (r₀ − r)/s; fitted are r₀, A and C.
     """
-    count = len(start)
+    count, (first, step) = len(start), distances
     dark, end = np.empty(count), np.empty(count)
     _find_darks(rays, first, step, start, max(DARK, DARK_WIDTHS * extent), dark, end)
     inside, outside = max(INSIDE, INSIDE_WIDTHS * extent), max(OUTSIDE, OUTSIDE_WIDTHS * extent)

@@ -142,9 +142,7 @@ def _loads(data: RunData, frame: int, length: float) -> tuple[Array, Array]:
     if forces.status is FrameStatus.FAILED:
         return np.full(n, np.nan), np.full(n, np.nan)
     contacts = forces.contacts
-    bears = forces.bearing_probability
-    bears = (forces.fn > 0.0).astype(np.float64) if bears is None else np.nan_to_num(bears)
-    total = sum_on_grains(contacts, bears)
+    total = sum_on_grains(contacts, forces.bearing)
     radius = np.full(contacts.grain_count, data.tracks.radius.mean())
     radius[:n] = data.tracks.radius
     stress = grain_stresses(contacts, forces.fn, forces.ft, radius, length)[:n]

@@ -35,11 +35,7 @@ def pair(workbench: Workbench, at: Text, i: Name, j: Name) -> dict[str, Any]:
 @endpoint
 def without_contact(workbench: Workbench, at: Text, frame: Whole, i: Name, j: Name) -> dict[str, Any]:
     """Compute the nearest forces of a photograph without a contact; nothing is written."""
-    opened = workbench.project(at)
-    results, first = _results(opened)
-    if not first <= frame < first + len(results.frames):
-        raise InputError(opened.results, f"photograph {frame}", f"is not there: {len(results.frames)} are")
-    answer = forces_without(results, frame - first, i, j)
+    answer = forces_without(*_frame_of(workbench.project(at), frame), i, j)
     if answer is None:
         raise InputError(f"{i} - {j}", f"photograph {frame}", "is no contact there")
     return answer
@@ -68,13 +64,10 @@ def figure(workbench: Workbench, at: Text, frame: Whole) -> dict[str, Any]:
     from ...figures.figure_style import paper_style  # drawing is imported where it is used
     from ...figures.force_network import draw_forces
 
-    opened = workbench.project(at)
-    results, first = _results(opened)
-    if not first <= frame < first + len(results.frames):
-        raise InputError(opened.results, f"photograph {frame}", f"is not there: {len(results.frames)} are")
+    results, row = _frame_of(workbench.project(at), frame)
     stream = io.StringIO()
     with paper_style():
-        draw_forces(results, frame - first, "double").savefig(stream, format="svg", metadata={"Date": None})
+        draw_forces(results, row, "double").savefig(stream, format="svg", metadata={"Date": None})
     return {"svg": stream.getvalue()}
 
 
@@ -103,6 +96,14 @@ def rod(workbench: Workbench, at: Text, id: Whole) -> dict[str, Any]:
             float("nan") if f.grain_unbalance is None else f.grain_unbalance[row] for f in results.frames
         ]),
     }  # fmt: skip
+
+
+def _frame_of(opened: Project, photograph: int) -> tuple[Results, int]:
+    """Finished results, and the row of a photograph in them; raises InputError where it is not there."""
+    results, first = _results(opened)
+    if not first <= photograph < first + len(results.frames):
+        raise InputError(opened.results, f"photograph {photograph}", f"is not there: {len(results.frames)} are")
+    return results, photograph - first
 
 
 def _results(opened: Project) -> tuple[Results, int]:

@@ -16,8 +16,8 @@ from rodsight import pipeline, run_folder
 from rodsight.experiment.experiment import load_experiment
 from rodsight.pipeline import EFFECTS, FORCES, TRACKING
 from rodsight.process.sources import APP, program_sources
+from rodsight.process.stages import Stage
 from rodsight.run_folder import hold_run
-from rodsight.stages import Stage
 
 from tests.program import rodsight
 

@@ -10,10 +10,10 @@ import pytest
 import rodsight as product
 from rodsight.experiment.experiment import load_experiment
 from rodsight.out_of_date import out_of_date, recording_out_of_date
+from rodsight.process.stages import FORCES
 from rodsight.results.manifest import MANIFEST, Manifest
 from rodsight.run_folder import Run, hold_run, owner_of
-from rodsight.stages import FORCES
-from rodsight.synthetic.synthesis import synthesize
+from rodsight.synthetic.synthesis import SynthesisSettings, synthesize
 from rodsight.verdicts.log import VerdictLog
 from rodsight.workbench.service.project import Project
 
@@ -107,7 +107,9 @@ def test_it_is_opened_in_python_with_a_warning(root):
 @pytest.fixture
 def neighbour(root: Path, tmp_path: Path) -> Path:
     """Another experiment of the same name, in the same place of another folder."""
-    synthesize(tmp_path / "other" / "tracked", grains=30, frames=5, photographs=False, noise=1e-5, seed=7)
+    synthesize(
+        tmp_path / "other" / "tracked", SynthesisSettings(grains=30, frames=5, photographs=False, noise=1e-5, seed=7)
+    )
     return tmp_path / "other"
 
 

@@ -25,7 +25,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from rodsight.recording.viewing import open_viewer, recording_server
-from rodsight.synthetic.synthesis import synthesize
+from rodsight.synthetic.synthesis import SynthesisSettings, synthesize
 
 from tests.app.exchange.foreign.test_pair_forces import DATA as MERCURY_DATA
 from tests.app.exchange.foreign.test_pegs import write_frame
@@ -60,6 +60,9 @@ SMALLER = {
     "--frame 11": ("--frame 3", "there are four photographs"),
     "--preset small --seed": ("--preset small --grains 20 --frames 3 --seed", "250 rods take half a minute"),
     "--preset paper --seed 1": ("--preset paper --seed 1 --grains 20", "1172 rods take minutes"),
+    "--no-photographs --frames 200": ("--no-photographs --grains 40 --frames 20", "1172 rods take minutes"),
+    "--grains 300 --frames 60": ("--grains 40 --frames 6", "300 rods take half a minute"),
+    "--preset fringes --grains 200": ("--preset fringes --grains 40", "a picture of each disc is computed"),
     "--preset shear --no-photographs": ("--preset shear --no-photographs --grains 60", "450 rods take a minute"),
     "--grains 150": ("--grains 60", "simulated anew"),
     "--ensemble 8": ("--ensemble 2", "each is solved again"),
@@ -120,7 +123,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         shear = folder / "sample_data/shear"
-        synthesize(shear, grains=20, frames=4, seed=12, pixel_size=PIXEL)
+        synthesize(shear, SynthesisSettings(grains=20, frames=4, seed=12, pixel_size=PIXEL))
         table = pd.read_csv(ROOT / "sample_data/campaign.csv").assign(frames="0:2")
         table.tail(2).to_csv(folder / "sample_data/campaign.csv", index=False)
         for name in ("my_test", "my_photographs"):

@@ -10,7 +10,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import pytest
 from rodsight.manual.contents import FOLDER
-from rodsight.synthetic.synthesis import synthesize
+from rodsight.synthetic.synthesis import SynthesisSettings, synthesize
 
 from tests.program import ROOT
 
@@ -32,7 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a smaller experiment instead of the sample: enough photographs, fewer rods."""
     folder = tmp_path_factory.mktemp("small")
-    synthesize(folder / "sample_data" / "shear", grains=40, frames=12, seed=2)
+    synthesize(folder / "sample_data" / "shear", SynthesisSettings(grains=40, frames=12, seed=2))
     return folder
 
 

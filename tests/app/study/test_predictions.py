@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import pytest
 from rich.console import Console
+from rodsight import prediction
 from rodsight.inference.diagnosis.causes import CAUSES, finding
 from rodsight.inference.diagnosis.trial import Trial
 from rodsight.prediction import Prediction
 from rodsight.solver.assessment.evidence import Evidence
 from rodsight.solver.assessment.expected_correlation import predict_correlation
+from rodsight.solver.assessment.penalties import find_penalties
 from rodsight.study.scenarios.predictions import TRUE_CAUSE, PredictionOutcome, print_predictions
 from rodsight.study.scenarios.scenario_score import ScenarioScore
 from rodsight.synthetic.scenarios.scenario_table import SCENARIOS
@@ -35,6 +37,62 @@ def test_the_prediction_follows_from_the_evidence_of_the_first_photographs():
     assert predicted(SOUND).expected == pytest.approx(predict_correlation([SOUND]))
     r, low, high = predicted(SOUND).expected
     assert 0.0 < low < r < high < 1.0
+
+
+def test_a_trial_is_judged_by_the_frames_whose_members_are_known():
+    unknown = replace(WRONG, disagreement=math.nan)
+    assert Trial((SOUND, unknown), 1).expected == pytest.approx(predict_correlation([SOUND]))
+    assert Trial((SOUND, unknown), 1).score == pytest.approx(Trial((SOUND,), 1).score)
+    assert math.isnan(Trial((unknown,), 1).expected[0])
+    assert Trial((unknown,), 1).score == -math.inf
+
+
+def test_hidden_and_unseen_rods_lower_the_prediction():
+    hidden = replace(SOUND, hidden_fraction=0.2)
+    assert Trial((hidden,), 1).expected[0] < 0.9 * Trial((SOUND,), 1).expected[0]
+
+
+def test_a_named_cause_contradicts_the_evidence_unless_a_run_corrects_it():
+    sound, contradicted = predict_correlation([SOUND]), predict_correlation([SOUND], contradicted=True)
+    assert contradicted[0] < sound[0]
+    for cause, expected in (("outlier_tracks", sound), ("friction", contradicted)):
+        each = replace(predicted(SOUND), diagnosis=(finding(cause, "evidence"),))
+        assert each.expected == pytest.approx(expected)
+        assert not each.good
+
+
+def test_the_weightiest_reason_is_stated():
+    weak = replace(SOUND, correction=0.6)
+    trial = Trial((weak, WRONG), 1)
+    assert trial.worst == max(find_penalties(WRONG)[0], find_penalties(weak)[0]).words
+    assert find_penalties(WRONG)[0].words != find_penalties(weak)[0].words
+
+
+def test_a_remark_states_why_there_is_no_prediction():
+    assert Prediction(GOOD, None, "The first photographs determine no friction.").verdict().endswith("no friction.")
+
+
+@pytest.mark.parametrize(("evidence", "compared"), [(SOUND, False), (WRONG, True)])
+def test_rival_inputs_are_compared_where_the_first_twelve_photographs_leave_them_open(monkeypatch, evidence, compared):
+    solved, diagnosed = [], []
+
+    def solve(inputs, photographs=6, observer=None):
+        solved.append(photographs)
+        return Trial((evidence,), photographs)
+
+    monkeypatch.setattr(prediction, "Inputs", lambda *_: "inputs")
+    monkeypatch.setattr(prediction, "material_of", lambda _: None)
+    monkeypatch.setattr(prediction, "settings_of", lambda _: None)
+    monkeypatch.setattr(prediction, "measure_data_quality", lambda *_: GOOD)
+    monkeypatch.setattr(prediction, "solve_trial", solve)
+    monkeypatch.setattr(prediction, "diagnose", lambda inputs, trial, progress: diagnosed.append(trial) or ())
+    monkeypatch.setattr(prediction, "DOUBTFUL", 0.9)
+    found = prediction.predict_accuracy("config", "tracks", "walls")
+    assert found.trial == Trial((evidence,), 12)
+    assert solved == ([12, 6] if compared else [12])
+    assert diagnosed == ([Trial((evidence,), 6)] if compared else [None])
+    assert prediction.predict_accuracy("config", "tracks", None) == Prediction(GOOD, None)
+    assert len(diagnosed) == 1
 
 
 def test_no_verdict_states_a_correlation_of_one(monkeypatch):

@@ -17,7 +17,7 @@ from rodsight.solver.nlgs.interval import Interval
 from rodsight.solver.nlgs.problem import ContactProblem, inertial_impedance
 from rodsight.solver.nlgs.solve import NlgsSettings, solve
 from rodsight.study import program_comparison as comparison
-from rodsight.synthetic.synthesis import Synthesis, synthesize
+from rodsight.synthetic.synthesis import Synthesis, SynthesisSettings, synthesize
 
 from tests.app.inference.scenarios import read_inputs
 
@@ -30,7 +30,9 @@ TOUCHING = 1.003  # factor of the true radii at which all contacts overlap
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Synthesis:
     folder = tmp_path_factory.mktemp("programs") / "lab"
-    return synthesize(folder, preset="1g2e", grains=RODS, frames=FRAMES, photographs=False, noise=1e-6, seed=2)
+    return synthesize(
+        folder, SynthesisSettings(preset="1g2e", grains=RODS, frames=FRAMES, photographs=False, noise=1e-6, seed=2)
+    )
 
 
 @pytest.fixture(scope="module")

@@ -33,7 +33,7 @@ def test_a_study_prints_coverages_and_constants(tmp_path, monkeypatch):
     monkeypatch.setattr("rodsight.study.report.uncertainty.NOISES", (1e-5,))
     printed = StringIO()
     fit = study_uncertainty(
-        [0], [1], members=2, grains=30, estimator="nlgs", folder=tmp_path, console=Console(file=printed, width=150)
+        ([0], [1]), members=2, grains=30, estimator="nlgs", folder=tmp_path, console=Console(file=printed, width=150)
     )
     assert np.all(np.array(fit) >= 0.0)
     assert "packings held out" in printed.getvalue()

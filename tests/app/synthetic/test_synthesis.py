@@ -15,7 +15,7 @@ from rodsight.experiment.units import Scale
 from rodsight.process.errors import InputError
 from rodsight.synthetic.dense_packing import RADIUS_CLASSES, choose_radii
 from rodsight.synthetic.rearrangement import choose_window
-from rodsight.synthetic.synthesis import Synthesis, synthesize
+from rodsight.synthetic.synthesis import Synthesis, SynthesisSettings, synthesize
 
 # A packing takes some ten thousand steps to prepare: minutes without compilation.
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
@@ -45,20 +45,21 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def photographed(tmp_path_factory: pytest.TempPathFactory) -> Synthesis:
-    return synthesize(tmp_path_factory.mktemp("photographed") / "tiny", seed=4, **TINY)
+    return synthesize(tmp_path_factory.mktemp("photographed") / "tiny", SynthesisSettings(seed=4, **TINY))
 
 
 @pytest.fixture(scope="module")
 def tracked(tmp_path_factory: pytest.TempPathFactory) -> Synthesis:
     return synthesize(
-        tmp_path_factory.mktemp("tracked") / "tiny", seed=4, photographs=False, noise=2e-5, **TINY | {"grains": 60}
+        tmp_path_factory.mktemp("tracked") / "tiny",
+        SynthesisSettings(seed=4, photographs=False, noise=2e-5, **TINY | {"grains": 60}),
     )
 
 
 def test_the_same_seed_gives_the_same_bytes(photographed: Synthesis, tmp_path: Path) -> None:
-    again = synthesize(tmp_path / "tiny", seed=4, **TINY)
+    again = synthesize(tmp_path / "tiny", SynthesisSettings(seed=4, **TINY))
     assert contents(again.folder) == contents(photographed.folder)
-    other = contents(synthesize(tmp_path / "other" / "tiny", seed=5, **TINY).folder)
+    other = contents(synthesize(tmp_path / "other" / "tiny", SynthesisSettings(seed=5, **TINY)).folder)
     assert all(other[name] != data for name, data in contents(photographed.folder).items())
 
 
@@ -142,7 +143,7 @@ def test_tracks_have_the_requested_noise(tracked: Synthesis) -> None:
 
 
 def test_tracks_without_noise_are_the_truth_at_the_finest_precision(tmp_path: Path) -> None:
-    folder = synthesize(tmp_path / "clean", photographs=False, **TINY).folder
+    folder = synthesize(tmp_path / "clean", SynthesisSettings(photographs=False, **TINY)).folder
     assert (folder / "tracks.csv").read_bytes() == (folder / "truth_tracks.csv").read_bytes()
     assert tomllib.loads((folder / "experiment.toml").read_text())["tracks"]["precision"] == 1e-6
 
@@ -174,7 +175,9 @@ def test_rods_in_photographs_are_at_their_true_positions(photographed: Synthesis
 
 
 def test_rods_and_bars_in_photographs_move_as_the_truth(tmp_path: Path) -> None:
-    made = synthesize(tmp_path / "turned", **TINY | {"frames": 2, "step_degrees": 6.0, "pixel_size": 2.5e-4})
+    made = synthesize(
+        tmp_path / "turned", SynthesisSettings(**TINY | {"frames": 2, "step_degrees": 6.0, "pixel_size": 2.5e-4})
+    )
     assert made.photograph_shape is not None
     scale = Scale(2.5e-4, made.photograph_shape[0])
     photographs = [
@@ -223,28 +226,32 @@ def test_the_true_grains_of_the_first_photograph_are_in_pixels(photographed: Syn
 
 def test_every_depth_and_format_can_be_read(tmp_path: Path) -> None:
     tiny = TINY | {"frames": 1}
-    deep = synthesize(tmp_path / "deep", depth=16, **tiny).folder
+    deep = synthesize(tmp_path / "deep", SynthesisSettings(depth=16, **tiny)).folder
     image = cv2.imread(str(deep / "photos" / "0000.png"), cv2.IMREAD_UNCHANGED)
     assert image is not None
     assert image.dtype == np.uint16
     assert len(np.unique(image)) > 256
-    small = synthesize(tmp_path / "small", jpeg_quality=90, **tiny).folder
+    small = synthesize(tmp_path / "small", SynthesisSettings(jpeg_quality=90, **tiny)).folder
     assert tomllib.loads((small / "experiment.toml").read_text())["photographs"]["files"] == "photos/*.jpg"
     assert cv2.imread(str(small / "photos" / "0000.jpg"), cv2.IMREAD_UNCHANGED) is not None
 
 
 def test_an_invalid_experiment_name_is_replaced(tmp_path: Path) -> None:
-    folder = synthesize(tmp_path / '"x":y', photographs=False, **TINY | {"frames": 1}).folder
+    folder = synthesize(tmp_path / '"x":y', SynthesisSettings(photographs=False, **TINY | {"frames": 1})).folder
     assert tomllib.loads((folder / "experiment.toml").read_text())["name"] == "synthetic -x--y"
 
 
 def test_a_reversal_changes_direction_half_way(tmp_path: Path) -> None:
-    shear = synthesize(tmp_path / "cycle", photographs=False, reversal=True, **TINY | {"frames": 5}).truth.shear
+    shear = synthesize(
+        tmp_path / "cycle", SynthesisSettings(photographs=False, reversal=True, **TINY | {"frames": 5})
+    ).truth.shear
     np.testing.assert_allclose(np.rad2deg(shear), [0.0, 0.25, 0.5, 0.25, 0.0], atol=1e-9)
 
 
 def test_the_small_preset_puts_a_rearrangement_among_its_photographs(tmp_path: Path) -> None:
-    small = synthesize(tmp_path / "small", preset="small", photographs=False, grains=30, frames=8, step_degrees=0.5)
+    small = synthesize(
+        tmp_path / "small", SynthesisSettings(preset="small", photographs=False, grains=30, frames=8, step_degrees=0.5)
+    )
     assert small.truth.frame_count == 8
     np.testing.assert_allclose(np.diff(np.rad2deg(small.truth.shear)), 0.5, atol=1e-9)
     assert np.isnan(small.old_unbalance[0])
@@ -267,8 +274,8 @@ def test_the_window_holds_the_greatest_event_with_margins_around_it() -> None:
 def apparatus(tmp_path_factory: pytest.TempPathFactory) -> Synthesis:
     folder = tmp_path_factory.mktemp("apparatus") / "lab"
     return synthesize(
-        folder, preset="1g2e", grains=60, frames=3, photographs=False, radius_error=-0.02, seed=1
-    )  # fmt: skip
+        folder, SynthesisSettings(preset="1g2e", grains=60, frames=3, photographs=False, radius_error=-0.02, seed=1)
+    )
 
 
 def test_the_apparatus_is_described(apparatus: Synthesis) -> None:
@@ -306,7 +313,9 @@ def test_rods_of_the_apparatus_are_in_balance_while_it_moves(apparatus: Synthesi
 
 
 def test_corner_discs_are_photographed(tmp_path: Path) -> None:
-    made = synthesize(tmp_path / "lab", preset="1g2e", grains=30, frames=1, pixel_size=5e-4, png=True)
+    made = synthesize(
+        tmp_path / "lab", SynthesisSettings(preset="1g2e", grains=30, frames=1, pixel_size=5e-4, png=True)
+    )
     image = cv2.imread(str(made.folder / "photos" / "0000.png"), cv2.IMREAD_GRAYSCALE)
     corners = read_columns(made.folder / "corners.csv")
     for x, y in zip(corners["x"], corners["y"], strict=True):
@@ -322,7 +331,7 @@ def test_radii_come_in_the_papers_classes() -> None:
 
 def test_progress_is_reported(tmp_path: Path) -> None:
     steps: list[tuple[str, int, int]] = []
-    synthesize(tmp_path / "tiny", progress=lambda *step: steps.append(step), **TINY)
+    synthesize(tmp_path / "tiny", SynthesisSettings(**TINY), progress=lambda *step: steps.append(step))
     stages = [("simulate", k, 3) for k in range(4)] + [("photograph", k, 3) for k in range(4)]
     assert steps == stages
 
@@ -330,10 +339,10 @@ def test_progress_is_reported(tmp_path: Path) -> None:
 def test_a_folder_that_is_not_empty_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(InputError, match="not an empty folder"):
-        synthesize(tmp_path, **TINY)
+        synthesize(tmp_path, SynthesisSettings(**TINY))
     assert contents(tmp_path) == {"notes.txt": b"mine"}
     with pytest.raises(InputError, match="not an empty folder"):
-        synthesize(tmp_path / "notes.txt", **TINY)
+        synthesize(tmp_path / "notes.txt", SynthesisSettings(**TINY))
 
 
 @pytest.mark.parametrize(
@@ -358,6 +367,6 @@ def test_a_folder_that_is_not_empty_is_left_alone(tmp_path: Path) -> None:
 )
 def test_a_wrong_argument_is_named_and_nothing_is_written(wrong: dict[str, Any], named: str, tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
-        synthesize(tmp_path / "out", **{"preset": "paper"} | wrong)
+        synthesize(tmp_path / "out", SynthesisSettings(**{"preset": "paper"} | wrong))
     assert named in str(caught.value)
     assert list(tmp_path.iterdir()) == []

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment
 from rodsight.solver.bodies.wall_shapes import OUT, STRAIGHT, circle_parameters
-from rodsight.synthetic.synthesis import synthesize
+from rodsight.synthetic.synthesis import SynthesisSettings, synthesize
 from rodsight.tracking.stage import track_first
 from rodsight.tracks import WallTracks
 
@@ -24,7 +24,7 @@ ACCURACY = 2.5e-5  # [m], a sixth of a pixel: rims are hidden where the bars beg
 def apparatus(tmp_path_factory) -> Path:
     """Write an apparatus whose corners are given in the first photograph, as clicked."""
     folder = tmp_path_factory.mktemp("corners") / "apparatus"
-    synthesize(folder, preset="1g2e", seed=2, grains=24, frames=FRAMES, step_degrees=STEP)
+    synthesize(folder, SynthesisSettings(preset="1g2e", seed=2, grains=24, frames=FRAMES, step_degrees=STEP))
     return folder
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from rodsight.synthetic.synthesis import SHEAR_RATE, synthesize
+from rodsight.synthetic.synthesis import SHEAR_RATE, SynthesisSettings, synthesize
 
 PIXEL = 2.5e-4  # [m]
 STEP = 0.25  # [°] of shear between photographs
@@ -46,8 +46,10 @@ class LaboratorySet:
 
 def make_laboratory_set(folder: Path, *, grains: int = 250, frames: int = 20, seed: int = 5) -> LaboratorySet:
     """Render the photographs into folder/camera, and keep the truth in folder/truth."""
-    made = synthesize(folder / "truth", grains=grains, frames=frames, seed=seed, depth=16, pixel_size=PIXEL,
-                      step_degrees=STEP)  # fmt: skip
+    made = synthesize(
+        folder / "truth",
+        SynthesisSettings(grains=grains, frames=frames, seed=seed, depth=16, pixel_size=PIXEL, step_degrees=STEP),
+    )
     rows, columns = made.photograph_shape or (0, 0)
     truth = made.truth
     poses = np.dstack([

@@ -5,9 +5,11 @@ import shutil
 import numpy as np
 import pytest
 from rodsight.experiment.reading.tables import read_table
-from rodsight.synthetic.synthesis import synthesize
+from rodsight.synthetic.synthesis import SynthesisSettings, synthesize
 from rodsight.workbench.service.workbench import Workbench
+from rodsight.workbench.setup import circles, initialise
 from rodsight.workbench.setup.draft import Draft
+from rodsight.workbench.setup.validation import validate
 
 from tests.app.workbench.conftest import Visitor
 
@@ -85,7 +87,7 @@ def test_a_corner_needs_the_bars_that_meet_there(visitor):
 @pytest.fixture
 def apparatus(tmp_path):
     """The photograph of a frame with discs in its corners, and the true discs (x, y, radius) [m] by their names."""
-    made = synthesize(tmp_path / "made", preset="1g2e", seed=2, grains=60, frames=1)
+    made = synthesize(tmp_path / "made", SynthesisSettings(preset="1g2e", seed=2, grains=60, frames=1))
     (tmp_path / "mine" / "pictures").mkdir(parents=True)
     for file in (made.folder / "photos").iterdir():
         shutil.copy(file, tmp_path / "mine" / "pictures")
@@ -134,6 +136,53 @@ def test_discs_in_the_corners_are_found_with_the_bars_or_by_a_click(apparatus, t
     assert "has a disc already" in visitor.refused("find_corner", at=at, **click)
     beside = {"x": disc["x"] + 2.5 * disc["radius"], "y": disc["y"] - 1.5 * disc["radius"]}
     assert "no disc with a visible rim" in visitor.refused("find_corner", at=at, **beside)
+
+
+FRAME = [np.array(ends, float) for ends in (
+    ((20, 380), (300, 380)), ((300, 380), (300, 20)), ((300, 20), (20, 20)), ((20, 20), (20, 380)),
+)]  # fmt: skip
+
+
+def test_discs_are_looked_for_between_the_bars_just_found_and_take_the_circles_on_them_away(visitor, monkeypatch):
+    (series,) = visitor.request("home")["series"]
+    at = visitor.request("begin", **{key: series[key] for key in ("folder", "suffix", "name")})["at"]
+    visitor.request("set_scale", at=at, pixel_size=2.5e-4)
+    for x, y in ((20, 380), (100, 200), (300, 380), (150, 200)):
+        rods = visitor.request("add_rod", at=at, x=x, y=y, radius=15.0)["rods"]
+    looked = []
+    discs = [
+        circles.Circle("first", 20.0, 381.0, 15.0, side="out"),
+        circles.Circle("second", 301.0, 380.0, 15.0, "out"),
+    ]
+
+    def find_corners(image, found):
+        looked.append(len(circles.bars_of(found)))
+        return discs
+
+    monkeypatch.setattr(initialise.edits, "find_walls", lambda image, found: FRAME)
+    monkeypatch.setattr(initialise.circles, "find_corners", find_corners)
+    described = visitor.request("find_walls", at=at)
+    assert looked == [4]
+    assert (described["bars"], described["discs"]) == (4, 2)
+    assert [wall["name"] for wall in described["walls"] if wall["corner"]] == ["first", "second"]
+    left = described["rods"]
+    assert left["id"] == [rods["id"][1], rods["id"][3]]
+    assert left["x"] == [rods["x"][1], rods["x"][3]]
+    assert left["r"] == [rods["r"][1], rods["r"][3]]
+    back = visitor.request("undo", at=at)
+    assert (back["rods"]["id"], back["walls"]) == (rods["id"], [])
+
+
+def test_only_ends_of_two_bars_that_meet_hold_a_disc_without_a_name_in_the_table(framed, monkeypatch):
+    visitor, at = framed
+    found = validate(Draft(visitor.workbench.root / at))
+    places = []
+    monkeypatch.setattr(circles, "find_disc", lambda _, place, within: places.append(place) or (*place, 20.0))
+    corners = circles.find_corners(np.zeros((400, 400), np.float32), found)
+    assert sorted(places) == sorted((each.x, each.y) for each in corners)
+    np.testing.assert_allclose(sorted(places), [(20.0, 380.0), (300.0, 380.0)])
+    monkeypatch.setattr(circles, "corner_names", lambda _: {corners[0].name})
+    assert [each.name for each in circles.find_corners(np.zeros((400, 400), np.float32), found)] == [corners[1].name]
 
 
 def test_a_frame_without_discs_has_bars_alone(visitor, photographs_only):

@@ -4,6 +4,7 @@ from tests.mutation.mutant import Mutant
 from tests.mutation.table import (
     assessment,
     baselines,
+    belonging,
     bodies,
     calibration,
     contacts,
@@ -17,6 +18,7 @@ from tests.mutation.table import (
     mixture,
     nlgs,
     posterior,
+    recording,
     redistribution,
     results,
     sequence,
@@ -49,6 +51,8 @@ MUTANTS: tuple[Mutant, ...] = tuple(
         exchange,
         tracking,
         workbench,
+        belonging,
+        recording,
     )
     for mutant in part.MUTANTS
 )

@@ -7,7 +7,7 @@ STATUS = f"{TESTS}/test_status.py"
 PENALTIES = f"{TESTS}/test_penalties.py"
 MIXING = "tests/solver/mixture/test_field_mixing.py"
 MIXTURE_TRUST = (f"{TESTS}/test_mixture_trust.py", MIXING)
-FORCE_INTERVALS = f"{TESTS}/test_force_intervals.py"
+FORCE_INTERVALS = f"{TESTS}/intervals/test_force_intervals.py"
 EXPECTED = f"{TESTS}/test_expected_correlation.py"
 OUTLIERS = "tests/app/inference/test_outliers.py"
 
@@ -53,7 +53,7 @@ MUTANTS = [
         (EXPECTED, PENALTIES),
         ("lambda e: 1.0 - e.agreement", "lambda e: e.agreement"),
         ("1.0 - float(np.fmax(e.agreement, e.overlap_agreement))", "1.0 - e.agreement"),
-        ("slope[0] * (_logarithm(table[name], measure) - math.log(slope[1]))", "0.0"),
+        ('float(bound["constant"]) + float(bound["score"]) * score', 'float(bound["constant"])'),
         ("math.tanh(score - max(margin, 0.0))", "math.tanh(score + max(margin, 0.0))"),
         ('min(max(measure, LEAST, table["at"][0]), table["at"][-1])', "max(measure, LEAST)"),
         ("np.mean(known)", "known[0]"),
@@ -61,7 +61,7 @@ MUTANTS = [
         ('np.log(table["at"])', 'np.asarray(table["at"])'),
         ('"motion" if math.isnan(evidence.agreement) else "both"', '"both"'),
         ("    if math.isnan(measure):\n        return 0.0\n", ""),
-        ('float(each["value"][0]) - _term', 'float(each["value"][-1]) - _term'),
+        ('float(each["value"][BEST_EIGHTH]) - _term', 'float(each["value"][-1]) - _term'),
     ),
     *mutants_of(
         "solver/assessment/mixture_trust.py",
@@ -76,15 +76,22 @@ MUTANTS = [
     *mutants_of(
         "app/inference/correction/outliers.py",
         OUTLIERS,
-        ("(1.0 if last else 0.5)", "1.0"),
+        ("2.0 * position[k - 1] - position[k - 2]", "position[k - 1]"),
         ("< 2.0 * RETURN * deviation", "< np.inf"),
         ("JUMP = 6.0", "JUMP = 80.0"),
-        ("change > PENETRATION * deviation[rows]", "change > -1.0"),
-        ("ONE_SIDED * least if last else least", "least"),
-        ("if jumps.mean() <= MOST:", "if True:"),
-        ("middle[rows] + np.nanmedian", "middle[rows] + 0.0 * np.nanmedian"),
-        ("0.5 * (tracks.rotation[k - 1, rows] + later[rows])", "later[rows]"),
-        ("step[known] - np.median(step[near], axis=1)", "step[known]"),
+        ("(change > PENETRATION * deviation)", "(change > -1.0)"),
+        ("ONE_SIDED * least if k == last else least", "least"),
+        ("greatest.mean(axis=1) > MOST", "greatest.mean(axis=1) > 1.0"),
+        ("change[known] - np.median(change[near], axis=1)", "change[known]"),
+        ("BLAMED * sd, noise, bodies)", "0.0 * sd, 0.0 * noise, bodies)"),
+        ("DEEP = 6.0", "DEEP = 600.0"),
+        ("np.fmin.reduce([*others, np.zeros(near.count)]) - deep", "1.0"),
+        ("np.where(deviation[i] >= deviation[j], i, j)", "np.where(deviation[i] <= deviation[j], i, j)"),
+        ("np.where(self._outlier[k][:, None], np.nan, self._position[k])", "self._position[k]"),
+        ("depth[~jumping[j]])", "0.0 * depth[~jumping[j]])"),
+        ("greatest[1:] &= size[1:] >= size[:-1]", "pass"),
+        ("range(max(row - 2, 0), min(row + 3, frames))", "range(row, row + 1)"),
+        ("side=walls.side, cell", "side=None, cell"),
     ),
     *mutants_of(
         "solver/assessment/penalties.py",
@@ -116,7 +123,7 @@ MUTANTS = [
         ("size ** (1.0 + POWER", "size ** (1.0 - POWER"),
         ("(HIGH_FRICTION if measured < given else 1.0)", "(HIGH_FRICTION if measured > given else 1.0)"),
         ("np.hypot(frame.ft_sd, measured * tangent)", "np.hypot(frame.ft_sd, tangent)"),
-        ("frame.trust / (1.0 - hidden)", "frame.trust"),
+        ("usual_trust(frame) / (1.0 - hidden)", "usual_trust(frame)"),
         ("fraction * abs(math.log(measured / given))", "abs(math.log(measured / given))"),
         ("group[frame.contacts.with_wall] = Group.WALL", "pass"),
         ("FACTOR[source][groups_of(frame)]", "FACTOR[source][groups_of(frame)][:, ::-1]"),
@@ -138,7 +145,7 @@ MUTANTS = [
     ),
     *mutants_of(
         "solver/assessment/intervals/statistic_intervals.py",
-        f"{TESTS}/test_statistic_intervals.py",
+        f"{TESTS}/intervals/test_statistic_intervals.py",
         ("float(np.sqrt(max(float(penalty_of(trust)), MIN_PENALTY)))", "max(float(penalty_of(trust)), MIN_PENALTY)"),
         ("if scale_is_known or name not in SIZED", "if True"),
         ("excess * error * size_of(name, float(getattr(statistics, name)))", "excess * error"),
@@ -147,7 +154,7 @@ MUTANTS = [
     ),
     *mutants_of(
         "solver/assessment/fitted.toml",
-        f"{TESTS}/test_statistic_intervals.py",
+        f"{TESTS}/intervals/test_statistic_intervals.py",
         ("\npressure = [0.097, 0.15, 0.51]", "\npressure = [0.51, 0.15, 0.097]"),
         ("\nmean_fn = 0.23", "\nmean_fn = 0.023"),
     ),
@@ -163,5 +170,18 @@ MUTANTS = [
         ("after - motion.interval * moving.velocity", "after - moving.velocity"),
         ("(beside & (out > 0.0)).any(axis=1)", "(out > 0.0).any(axis=1)"),
         ("strong = fn > STRONG * fn[bearing].mean()", "strong = fn > STRONG * fn[bearing].mean() * 0.0"),
+    ),
+    *mutants_of(
+        "solver/assessment/fringe_pressures.py",
+        f"{TESTS}/test_fringe_pressures.py",
+        ("if forces.status is not FrameStatus.FAILED:", "if True:"),
+        ("inferred[k, used[k]] = total[used[k]]", "inferred[k] = total"),
+        ("if known.sum() < FEWEST:", "if False:"),
+        ("known = np.isfinite(inferred) & np.isfinite(fringes)", "known = np.isfinite(inferred)"),
+        ("sum_on_grains(forces.contacts, forces.fn)", "sum_on_grains(forces.contacts, forces.ft)"),
+        ("np.interp(fringes[known], knot, level)", "fringes[known]"),
+        ("if here.sum() > 2 else np.nan", "if here.sum() > 0 else np.nan"),
+        ("return self.measured - self.inferred", "return self.inferred - self.measured"),
+        ("float(np.nanmean(self.inferred))", "float(np.mean(self.inferred))"),
     ),
 ]

@@ -70,7 +70,7 @@ MUTANTS = [
         ("matrix[:, 1] = -2.0", "matrix[:, 1] = -1.0"),
         ("matrix[:, 0] = peaks.distance", "matrix[:, 0] = -peaks.distance"),
         ("return follow < stay", "return follow > stay"),
-        ("sequence.radius + self.radius_offset +", "sequence.radius - self.radius_offset +"),
+        ("* radius + self.radius_offset + of_class", "* radius - self.radius_offset + of_class"),
         ("limit * np.maximum(np.abs(errors), NEGLIGIBLE * limit)", "limit**2"),
     ),
     *mutants_of(

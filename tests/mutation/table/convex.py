@@ -5,20 +5,22 @@ from tests.mutation.mutant import mutants_of
 PROGRAM = "tests/solver/convex/test_program.py"
 TWIN = "tests/reference/test_convex_program.py"
 
+SLIDING = "tests/solver/convex/test_sliding_model.py"
+
 MUTANTS = [
     *mutants_of(
         "solver/convex/program.py",
         PROGRAM,
-        ("balance.friction * np.abs(slip) + settings.ambiguity_penalty", "settings.ambiguity_penalty"),
+        ("* balance.friction * np.abs(slip)", "* np.abs(slip)"),
         ("np.minimum(ambiguity, 100.0), slip]", "np.minimum(ambiguity, 100.0), -slip]"),
         ("-np.log(2.0 * probability)", "-np.log(probability)"),
         ("np.abs(slip) - settings.slip_noise * sigma, 0.0) / scale", "np.abs(slip), 0.0) / scale"),
         (
-            "weight[2 * n : 3 * n] /= grains.radius[present].mean()",
-            "weight[2 * n : 3 * n] *= grains.radius[present].mean()",
+            "weight[2 * n : 3 * n] /= lever",
+            "weight[2 * n : 3 * n] *= lever",
         ),
         ("balance: float = 1e3", "balance: float = 1.0"),
-        ("wall_normal_total / force_unit", "wall_normal_total"),
+        ("load = np.append(load, total / force_unit)", "load = np.append(load, total)"),
         ("np.tile(present, 3)", "np.tile(np.ones_like(present), 3)"),
     ),
     *mutants_of(
@@ -87,5 +89,65 @@ MUTANTS = [
             "np.column_stack([gap, gaps_at(first)])",
         ),
         ("friction=scale * frame.balance.friction", "friction=frame.balance.friction"),
+    ),
+    *mutants_of(
+        "solver/convex/sliding_model.py",
+        SLIDING,
+        ("wall_friction=self.wall_friction * value / self.friction", "wall_friction=value"),
+        ("slip=-self.slip, drag=-self.drag", "slip=-self.slip"),
+        ("np.where(wall, model.wall_friction, model.friction)", "np.where(wall, model.friction, model.friction)"),
+        ("np.where(wall, 0.0, model.attraction * self.probability)", "np.where(wall, 0.0, model.attraction)"),
+        ("np.where(wall, 0.0, model.attraction * self.probability)", "model.attraction * self.probability"),
+        ("model.base_drag * self.drag", "self.drag"),
+        (
+            "return replace(given, load=load, grains=blocks, friction=friction)",
+            "return replace(given, load=load, friction=friction)",
+        ),
+        ("power_gaps((each.under(model) for each in frames), settings)", "power_gaps(frames, settings)"),
+        (
+            "model, enclosed = model.with_value(name, value), enclosed and inside",
+            "model, enclosed = model.with_value(name, value), True",
+        ),
+        ("ROUNDS = 3", "ROUNDS = 1"),
+        ("best = min(near, key=gap)", "best = max(near, key=gap)"),
+        ("if q == len(trial) - 1 or (q == 0", "if (q == 0"),
+        ("x[0], x[2]))", "x[0], x[0]))"),
+    ),
+    *mutants_of(
+        "solver/convex/resistance.py",
+        SLIDING,
+        ("if turned < min(REVERSED * before, MOST_GAP):", "if turned < MOST_GAP:"),
+        ('if name != "wall_friction" or walls >= LEAST_WALLS', "if True"),
+        ("> MOST_FRICTION * given.friction:", "> 1e9 * given.friction:"),
+        ("min(before, friction))", "before)"),
+        ('if name not in (best, "friction")', "if name not in (best, *sound)"),
+        ("return gap < min(CLEAR * other, other - LEAST_GAP, MOST_GAP)", "return gap < min(CLEAR * other, MOST_GAP)"),
+        (
+            "return gap < min(CLEAR * other, other - LEAST_GAP, MOST_GAP)",
+            "return gap < min(CLEAR * other, other - LEAST_GAP)",
+        ),
+        ("if not before > QUIET or", "if"),
+        ("< REVERSED * before:\n            break", "< 0.0:\n            break"),
+        ("(np.delete(gap, best) * AHEAD < gap[best]).any()", "False"),
+        ("each.gap if each.enclosed else before", "each.gap"),
+        ("        del left[best]\n", "        break\n"),
+        ("if each.enclosed}", "}"),
+        ("* float(packing.grains.mass.mean()) / force_unit", "/ force_unit"),
+        ("rows[2 * count : 3 * count] = TORQUE_WEIGHT", "pass"),
+        ("drag=None, moment=None, moment_sd=None", "moment=None, moment_sd=None"),
+        ("+ 4.0 * now.sigma**2", ""),
+        ("share = packing.grains.mass / packing.grains.mass.mean()", "share = np.ones(packing.grains.count)"),
+        ("after.position - before.position", "before.position - after.position"),
+        ("packing.material.friction <= 0.0 or packing.material.wall_friction <= 0.0", "False"),
+    ),
+    *mutants_of(
+        "solver/convex/friction_check.py",
+        SLIDING,
+        ("(snapshots[k - 1], snapshots[k + 1])", "(snapshots[k - 1], snapshots[k])"),
+    ),
+    *mutants_of(
+        "solver/convex/friction_estimate.py",
+        SLIDING,
+        ("memory.recall(frame.contacts)", "0.0 * memory.recall(frame.contacts)"),
     ),
 ]

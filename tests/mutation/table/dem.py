@@ -67,10 +67,7 @@ MUTANTS = [
             "resultant = np.linalg.norm(self._bodies.force[:, :2], axis=1)",
         ),
         ("getattr(pairs, name)[row] = getattr(former, name)[former_row]", "getattr(pairs, name)[row] = 0.0"),
-        (
-            "pressure * self.settings.length)))",
-            "self.settings.length)))",
-        ),
+        ("inertial_time(self.grains.mass.mean(), pressure,", "inertial_time(self.grains.mass.mean(), 1.0,"),
         ("self._bodies.state[~self.touching, 3:] = 0.0", "self._bodies.state[self.touching, 3:] *= 1.0"),
     ),
     *mutants_of(

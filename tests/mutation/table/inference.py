@@ -3,6 +3,7 @@
 from tests.mutation.mutant import mutants_of
 
 TESTS = "tests/app/inference"
+PREDICTION = "tests/app/study/test_predictions.py"
 
 MUTANTS = [
     *mutants_of(
@@ -63,7 +64,8 @@ MUTANTS = [
         ("LONGEST = 2", "LONGEST = 3"),
         ("LONGEST if inside else 1", "LONGEST"),
         ("> MOST] = False", "> 1.0] = False"),
-        ("line[rows] + np.median", "line[rows] - np.median"),
+        ("* tracks.rotation[poses.before, poses.row]", "* tracks.rotation[poses.after, poses.row]"),
+        ("status[k, gaps[k]] = TrackStatus.INTERPOLATED", "pass"),
     ),
     *mutants_of(
         "app/inference/diagnosis/direct_tests.py",
@@ -118,5 +120,73 @@ MUTANTS = [
         ("TrackStatus.INFERRED, TrackStatus.LOST", "TrackStatus.LOST, TrackStatus.INFERRED"),
         (">= tracks.grain_count)", "< tracks.grain_count)"),
         ("UnseenRodSettings(noise, sizes, overlap)", "UnseenRodSettings(noise, None, overlap)"),
+    ),
+    *mutants_of(
+        "app/inference/correction/radii.py",
+        f"{TESTS}/diagnosis/test_direct_tests.py",
+        ("near = near.select(~near.with_wall)", "pass"),
+        ("alike = sizes[near.i] == sizes[near.j]", "alike = sizes[near.i] >= 0"),
+        ("depth.append(-near.gap[alike])", "depth.append(near.gap[alike])"),
+        ("count >= FEWEST", "count >= 0"),
+        ("overlap = {r: d / (2.0 * r)", "overlap = {r: d / r"),
+        ("if each > SEEN and", "if"),
+        ("and mean.min() < UNEQUAL * 2.0 * r * each", ""),
+        ("- set(failed)):\n        present", "):\n        present"),
+    ),
+    *mutants_of(
+        "app/inference/correction/radii.py",
+        f"{TESTS}/test_radii.py",
+        ('material.stiffness in (None, "rigid")', "material.stiffness is None"),
+        ("np.full(tracks.grain_count, remaining)", "np.full(tracks.grain_count, 0.0)"),
+        ("if tracks.centre_sigma is None or not then.applied:", "if False:"),
+        ("before=first.before", "before=then.before"),
+    ),
+    *mutants_of(
+        "app/inference/diagnosis/resistance.py",
+        f"{TESTS}/diagnosis/test_resistance.py",
+        ('found.cause == "friction" and sequence.friction_measured', "False"),
+        ("found.found.friction / BIAS:.2f}, not", "found.found.friction:.2f}, not"),
+        ("100.0 * found.found.base_drag", "found.found.base_drag"),
+        ("{found.given.wall_friction:g}, and", "{found.given.friction:g}, and"),
+        (
+            "100.0 * found.given_gap:.0f} to {100.0 * found.found_gap",
+            "100.0 * found.found_gap:.0f} to {100.0 * found.given_gap",
+        ),
+        ("if not sequence.packing.scale_is_known:", "if False:"),
+        ("drag / sequence.base_gravity", "drag"),
+        ("max(1, (len(snapshots) - FRAMES) // 2)", "0"),
+    ),
+    *mutants_of(
+        "app/inference/diagnosis/trial.py",
+        PREDICTION,
+        ("kept * each for each in predict", "each for each in predict"),
+        ("contradicted=contradicted))", "contradicted=False))"),
+        ("if not math.isnan(each.disagreement)]\n        if not found:", "]\n        if not found:"),
+        ("if not math.isnan(each.disagreement)]\n        return float", "]\n        return float"),
+        ("return max(found).words", "return min(found).words"),
+    ),
+    *mutants_of(
+        "app/inference/diagnosis/trial.py",
+        f"{TESTS}/diagnosis/test_trial.py",
+        ("store.frames[min(SETTLED, len(store.frames) - 1) :]", "store.frames"),
+        ("if each.state.evidence.assessed)", ")"),
+        ("first + stride * (photographs - 1) + 1", "first + photographs"),
+        ("min(first + stride", "min(stride"),
+        ("if given.tracks.frame_count < 2:", "if False:"),
+        ("(UndeterminedError, ValueError, FloatingPointError)", "(UndeterminedError, FloatingPointError)"),
+    ),
+    *mutants_of(
+        "app/prediction.py",
+        PREDICTION,
+        ("each.cause not in CORRECTED for each", "True for each"),
+        ("self.expected[0] >= GOOD and not self.diagnosis", "self.expected[0] >= GOOD"),
+        ("(min(each, MOST_STATED) for each in (r, low, high))", "(r, low, high)"),
+        ("if self.trial.stride > 1:", "if False:"),
+        ("if r < POOR and obstacle:", "if False:"),
+        ("reason = obstacle or self.trial.worst", "reason = obstacle"),
+        ("return self.remark or NOT_PREDICTED", "return NOT_PREDICTED"),
+        ("trial is not None and trial.expected[0] < DOUBTFUL", "False"),
+        ("if walls is None:", "if False:"),
+        ("solve_trial(inputs, PREDICTED_PHOTOGRAPHS,", "solve_trial(inputs, 2,"),
     ),
 ]

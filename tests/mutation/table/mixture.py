@@ -12,7 +12,7 @@ MUTANTS = [
         ("own + weight * (1.0 - weight) * (one - two) ** 2", "own"),
         ("force * factor ** (weight - 1.0)", "force * factor**weight"),
         ("motion.fn.sum() / positions.fn.sum()", "positions.fn.sum() / motion.fn.sum()"),
-        ("0.0 if np.isnan(motion_trust) else weight\n", "weight\n"),
+        ("0.0 if np.isnan(motion_trust) else softness.motion_weight", "softness.motion_weight"),
         ("(overlap / (HALF_WEIGHT_OVERLAP * moved)) ** 2", "overlap / (HALF_WEIGHT_OVERLAP * moved)"),
         ("_mixture_sd(u, motion.ft, factor * other.ft,", "_mixture_sd(u, motion.ft, other.ft,"),
         ("(1.0 - weight) * one_sd**2 + weight * two_sd**2", "weight * one_sd**2 + (1.0 - weight) * two_sd**2"),

@@ -33,7 +33,7 @@ MUTANTS = [
     *mutants_of(
         "app/results/hdf5/reader.py",
         READER,
-        ("every[self.number[self.sweep[k] : self.sweep[k + 1]]] = values", "every[: len(values)] = values"),
+        ("every[number] = values", "every[: len(values)] = values"),
         ("slice(int(edges[k]), int(edges[k + 1]))", "slice(int(edges[k]), int(edges[k + 1]) - 1)"),
         ("if not isinstance(link, h5py.HardLink):", "if False:"),
         ("if dataset.external or dataset.is_virtual:", "if False:"),
@@ -44,8 +44,8 @@ MUTANTS = [
         ("if dataset.shape != shape:", "if len(dataset.shape) != len(shape):"),
         ("if values[0] != 0 or np.any(np.diff(values) < 0):", "if values[0] != 0:"),
         (
-            "if np.any(number >= np.repeat(count, np.diff(sweep))):",
-            "if np.any(number > np.repeat(count, np.diff(sweep))):",
+            "np.any(number >= np.repeat(count[k : k + BLOCK], np.diff(edges)))",
+            "np.any(number > np.repeat(count[k : k + BLOCK], np.diff(edges)))",
         ),
     ),
     *mutants_of(

@@ -66,4 +66,33 @@ MUTANTS = [
         ("if old.get(name) != new.get(name)]", "if name in new]"),
         ("fits.kept[0] > KEPT_LEAST and fits.zncc[0] > AGREES", "fits.kept[0] > 2.0"),
     ),
+    *mutants_of(
+        "app/workbench/setup/initialise.py",
+        "tests/app/workbench/test_corner_discs.py",
+        (
+            "        barred = validate(draft)\n        discs = find_discs(draft, image, barred)\n    return",
+            "        discs = find_discs(draft, image, found)\n    return",
+        ),
+        ('with draft.one_step("walls found"):', "if True:"),
+        ("return len(lines), discs", "return discs, discs"),
+        ("        add_discs(draft, found, discs)\n    return", "        pass\n    return"),
+        (
+            "on |= np.hypot(rods.x - disc.x, rods.y - disc.y) < disc.radius",
+            "on = np.hypot(rods.x - disc.x, rods.y - disc.y) < disc.radius",
+        ),
+        ("rods.y - disc.y) < disc.radius", "rods.y - disc.y) > disc.radius"),
+        (
+            "GrainGuess(rods.id[~on], rods.x[~on], rods.y[~on], rods.radius[~on])",
+            "GrainGuess(rods.id[~on], rods.x[~on], rods.y[~on], rods.radius[on])",
+        ),
+    ),
+    *mutants_of(
+        "app/workbench/setup/circles.py",
+        "tests/app/workbench/test_corner_discs.py",
+        (
+            "if other != name and float(np.hypot(*(place - end))) < MEETING:",
+            "if float(np.hypot(*(place - end))) < MEETING:",
+        ),
+        ("return [each for each in discs if each.name not in taken]", "return discs"),
+    ),
 ]

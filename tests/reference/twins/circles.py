@@ -25,7 +25,7 @@ def measured(coefficients: Image, dark: Image, contrast: Image, rough: Array, ru
         return none
     angle, distance = outline.angle[seen], outline.distance[seen]
     weight = np.minimum(outline.strength[seen] / (0.3 * local), 1.0) ** 2
-    circle = fit_circle(x, y, radius + shift, angle, distance, weight, radius_sd=scatter, min_scale=0.1)
+    circle = fit_circle((x, y, radius + shift), angle, distance, weight, radius_sd=scatter, min_scale=0.1)
     moved = np.hypot(circle.x - x, circle.y - y) + abs(circle.radius - radius - shift)
     if not moved < 2.5 * window:
         return none

@@ -11,7 +11,7 @@ from rodsight.solver.bodies.packing import Material
 from rodsight.solver.bodies.wall_shapes import OUT, STRAIGHT
 from rodsight.solver.bodies.walls import Walls
 from rodsight.solver.contacts.contacts import Contacts, detect_contacts
-from rodsight.solver.nlgs.problem import ContactProblem, assemble
+from rodsight.solver.nlgs.problem import ContactProblem, PreparedContacts, assemble
 
 COLUMNS, ROWS = 13, 12
 PITCH = 0.0161  # [m]
@@ -32,7 +32,13 @@ class Case:
 
     def assemble(self) -> ContactProblem:
         return assemble(
-            self.grains, self.motion, self.walls, self.contacts, self.material, self.impedance, closing=self.closing
+            self.grains,
+            self.motion,
+            self.walls,
+            self.contacts,
+            self.material,
+            self.impedance,
+            PreparedContacts(self.closing),
         )
 
 

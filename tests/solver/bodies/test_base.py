@@ -7,7 +7,7 @@ import pytest
 from rodsight.solver.bodies.grains import GrainMotion
 from rodsight.solver.bodies.packing import BASE_ARM
 from rodsight.solver.contacts.contacts import detect_contacts
-from rodsight.solver.convex.program import assemble_balance
+from rodsight.solver.convex.program import LoadScale, assemble_balance
 from rodsight.solver.nlgs.problem import assemble
 
 from tests.solver.sequence.test_frames import sheared_frames
@@ -48,7 +48,7 @@ def test_both_enter_the_equilibrium_of_the_convex_program(moved):
     def load(grains):
         friction = packing.material.friction_at(contacts.with_wall)
         return assemble_balance(
-            contacts, grains, walls, present=snapshots[1].present, friction=friction, force_unit=1.0
+            contacts, grains, walls, present=snapshots[1].present, friction=friction, scale=LoadScale(1.0)
         ).load
 
     n, added = packing.grains.count, load(replace(based.grains, moment_sd=None)) - load(packing.grains)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from rodsight.solver.contacts.contacts import Contacts, detect_contacts
 from rodsight.solver.convex.dual_prices import price_pairs
-from rodsight.solver.convex.program import assemble_balance, solve_convex_member
+from rodsight.solver.convex.program import LoadScale, assemble_balance, solve_convex_member
 
 from tests.packings import box, rods
 
@@ -24,7 +24,7 @@ def column(top_load: float):
 def price(grains, walls, contacts: Contacts, pairs: Contacts, present=None) -> np.ndarray:
     present = np.ones(grains.count, bool) if present is None else present
     balance = assemble_balance(
-        contacts, grains, walls, present=present, friction=np.full(contacts.count, 0.25), force_unit=UNIT
+        contacts, grains, walls, present=present, friction=np.full(contacts.count, 0.25), scale=LoadScale(UNIT)
     )
     nothing = np.zeros(contacts.count)
     found = solve_convex_member(balance, nothing, nothing + 1.0, nothing, nothing)

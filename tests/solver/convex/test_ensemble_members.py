@@ -5,7 +5,7 @@ from rodsight.solver.bodies.motion import Snapshot
 from rodsight.solver.bodies.walls import Walls
 from rodsight.solver.contacts.contacts import Contacts, detect_contacts
 from rodsight.solver.convex.ensemble_members import Slip, advance_convex_member, measured_slip, read_slip, steady_slip
-from rodsight.solver.convex.program import Balance, assemble_balance, solve_convex_member
+from rodsight.solver.convex.program import Balance, LoadScale, assemble_balance, solve_convex_member
 from rodsight.solver.detection.touch_probability import probable_contacts, window_of
 from rodsight.solver.nlgs.force_memory import ForceMemory
 
@@ -39,7 +39,7 @@ def problem(frame: Snapshot) -> tuple[Grains, Walls, Contacts, Balance]:
     walls = Walls(frame.endpoints, np.zeros((4, 2, 2)), np.array([np.nan, np.nan, 100.0, np.nan]))
     contacts = detect_contacts(grains, frame.position, frame.present, walls, 1e-5)
     balance = assemble_balance(
-        contacts, grains, walls, present=frame.present, friction=np.full(contacts.count, 0.25), force_unit=20.0
+        contacts, grains, walls, present=frame.present, friction=np.full(contacts.count, 0.25), scale=LoadScale(20.0)
     )
     return grains, walls, contacts, balance
 

@@ -12,7 +12,7 @@ from rodsight.solver.convex.friction_estimate import (
     estimate_friction,
     relative_power_gap,
 )
-from rodsight.solver.convex.program import assemble_balance
+from rodsight.solver.convex.program import LoadScale, assemble_balance
 
 EXACT = 1e-12  # rounding of a few terms of order one
 PARABOLA = 1e-9  # a parabola through three points of a parabola has its minimum
@@ -43,7 +43,7 @@ def wedge(tilt: float) -> SlidingFrame:
     walls = Walls(endpoints, np.zeros((4, 2, 2)), np.array([np.nan, np.nan, 20.0, np.nan]))
     contacts = detect_contacts(grains, np.array([[0.1, r]]), np.ones(1, bool), walls, 1e-9)
     balance = assemble_balance(
-        contacts, grains, walls, present=np.ones(1, bool), friction=np.full(contacts.count, 0.25), force_unit=20.0
+        contacts, grains, walls, present=np.ones(1, bool), friction=np.full(contacts.count, 0.25), scale=LoadScale(20.0)
     )
     slip = np.zeros(contacts.count)
     slip[contacts.j == 3] = -1.0

@@ -9,6 +9,7 @@ from rodsight.solver.convex.program import (
     Balance,
     ConvexForces,
     ConvexSettings,
+    LoadScale,
     assemble_balance,
     project_onto_equilibrium,
     soft_slip,
@@ -61,7 +62,7 @@ def balance_of(
 ) -> Balance:
     return assemble_balance(
         contacts, grains, walls, present=np.ones(grains.count, bool), friction=np.full(contacts.count, friction),
-        force_unit=force_unit, gravity=gravity, wall_normal_total=wall_normal_total,
+        scale=LoadScale(force_unit, gravity, wall_normal_total),
     )  # fmt: skip
 
 
@@ -201,7 +202,7 @@ def test_projection_equilibrates_a_noisy_field_with_little_change():
 
 def test_without_load_the_given_total_fixes_the_scale():
     grains, _, walls, contacts = stack(top_load=np.nan)
-    with pytest.raises(ValueError, match="wall_normal_total"):
+    with pytest.raises(ValueError, match="a total must fix the scale"):
         balance_of(grains, walls, contacts)
     forces = solve(balance_of(grains, walls, contacts, wall_normal_total=60.0))
     np.testing.assert_allclose(forces.fn, 30.0, atol=BALANCED)
@@ -213,7 +214,7 @@ def test_a_missing_grain_has_no_equilibrium_equations():
     contacts = detect_contacts(grains, position, present, walls, 1e-9)
     balance = assemble_balance(
         contacts, grains, box(0.1, walls.endpoints[2, 0, 1]), present=present,
-        friction=np.full(contacts.count, 0.25), force_unit=UNIT, wall_normal_total=10.0,
+        friction=np.full(contacts.count, 0.25), scale=LoadScale(UNIT, total=10.0),
     )  # fmt: skip
     assert balance.matrix.shape == (7, 2 * contacts.count)
 

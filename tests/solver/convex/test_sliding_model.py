@@ -5,7 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rodsight.solver.convex import resistance
-from rodsight.solver.convex.resistance import base_drag_of, find_resistance, find_unstated, model_of, resisted_frames
+from rodsight.solver.convex.ensemble_members import measured_slip
+from rodsight.solver.convex.friction_estimate import relative_power_gap
+from rodsight.solver.convex.grain_blocks import block_balance
+from rodsight.solver.convex.program import LoadScale, assemble_balance, solve_convex_member
+from rodsight.solver.convex.resistance import (
+    TORQUE_WEIGHT,
+    base_drag_of,
+    find_in_sequence,
+    find_resistance,
+    find_unstated,
+    model_of,
+    resisted_frames,
+)
 from rodsight.solver.convex.sliding_model import FittedModel, SlidingModel, fit_model, power_gap
 from rodsight.solver.detection.touch_probability import ContactProbabilitySettings
 from rodsight.solver.nlgs.chain import ChainSettings, force_scale
@@ -50,12 +62,67 @@ def test_the_base_drags_against_the_motion(frames):
     assert base_drag_of(packing, model_of(replace(packing, material=material), unit), unit) == pytest.approx(3.0)
 
 
+def test_a_drag_grows_with_the_mass_and_fades_where_the_motion_is_noise(frames):
+    packing, unit, _ = frames
+    _, snapshots = sheared_frames(6)
+    mass = packing.grains.mass * np.linspace(0.5, 1.5, packing.grains.count)
+    heavy = replace(packing, grains=replace(packing.grains, mass=mass))
+    noisy = [replace(each, sigma=3e-5) for each in snapshots]
+    (frame,) = resisted_frames(heavy, noisy, [2], unit, ContactProbabilitySettings(1e-6))
+    moved = noisy[3].position - noisy[1].position
+    expected = (mass / mass.mean() / np.sqrt((moved**2).sum(axis=1) + 4.0 * 3e-5**2))[:, None] * moved
+    np.testing.assert_allclose(frame.drag[: 2 * frame.grain_count].reshape(2, -1).T, expected)
+
+
+def test_a_frame_has_light_torques_no_stated_drag_and_the_sliding_around_it(frames):
+    packing, unit, _ = frames
+    _, snapshots = sheared_frames(6)
+    drag = np.ones((packing.grains.count, 2))
+    based = replace(packing, grains=replace(packing.grains, drag=drag))
+    (frame,) = resisted_frames(based, snapshots, [2], unit, ContactProbabilitySettings(1e-6))
+    walls = packing.walls_of(snapshots[2])
+    plain = assemble_balance(
+        frame.contacts, packing.grains, walls, present=snapshots[2].present, friction=frame.balance.friction,
+        scale=LoadScale(unit, packing.material.gravity),
+    )  # fmt: skip
+    weight = np.ones(len(plain.load))
+    weight[2 * frame.grain_count : 3 * frame.grain_count] = TORQUE_WEIGHT
+    assert frame.balance.matrix.toarray() == pytest.approx(weight[:, None] * plain.matrix.toarray())
+    assert frame.balance.load == pytest.approx(weight * plain.load)
+    around = measured_slip(frame.contacts, packing.grains, walls, (snapshots[1], snapshots[3]))
+    np.testing.assert_array_equal(frame.slip, around)
+
+
+def test_the_power_gap_is_that_of_forces_under_the_model(frames):
+    _, _, (frame, *_) = frames
+    frame = replace(frame, slip=np.random.default_rng(4).normal(size=len(frame.slip)))
+    model = SlidingModel(0.4, 0.1, 0.1, 0.2)
+    balance, c = frame.balance_of(model), frame.balance.contact_count
+    np.testing.assert_array_equal(balance.friction, np.where(frame.contacts.with_wall, 0.1, 0.4))
+    blocks = block_balance(balance.matrix, balance.load, frame.grain_count, c)
+    for name in ("load", "jacobian"):
+        np.testing.assert_array_equal(getattr(balance.grains, name), getattr(blocks, name))
+    found = solve_convex_member(balance, frame.slip, frame.probability, np.zeros(c), np.zeros(c))
+    expected = relative_power_gap(frame.slip, balance.friction, found.fn, found.ft)
+    assert power_gap([frame], model) == pytest.approx(expected)
+    assert expected != pytest.approx(relative_power_gap(frame.slip, frame.balance.friction, found.fn, found.ft))
+
+
+def test_later_frames_remember_the_forces_of_earlier_ones(frames):
+    _, _, (frame, *_) = frames
+    rng = np.random.default_rng(3)
+    some = [replace(frame, slip=rng.normal(size=len(frame.slip))) for _ in range(2)]
+    alone = [power_gap([each], GIVEN) for each in some]
+    assert power_gap(some, GIVEN) != pytest.approx(np.mean(alone), rel=1e-9)
+
+
 def test_a_reversed_motion_has_another_gap(frames):
     rng = np.random.default_rng(2)
     some = [replace(each, slip=rng.normal(size=len(each.slip))) for each in frames[2]]
     there, back = power_gap(some, GIVEN), power_gap([each.reversed() for each in some], GIVEN)
     assert there != pytest.approx(back)
     assert power_gap([each.reversed().reversed() for each in some], GIVEN) == there
+    np.testing.assert_array_equal(some[0].reversed().drag, -some[0].drag)
 
 
 def test_the_fit_ends_where_the_gap_rises_on_both_sides(frames, monkeypatch):
@@ -73,6 +140,26 @@ def test_the_fit_ends_where_the_gap_rises_on_both_sides(frames, monkeypatch):
         assert found.model.value(name) == pytest.approx(best.value(name), rel=0.02)
     monkeypatch.setattr("rodsight.solver.convex.sliding_model.power_gap", lambda _, model, __=None: 1 / model.friction)
     assert not fit_model([], GIVEN, ("friction",)).enclosed
+
+
+def test_parameters_that_shift_one_another_are_fitted_in_rounds(monkeypatch):
+    def valley(_, model, settings=None):
+        x, y = model.friction - 0.3, model.base_drag - 0.1
+        return 0.05 + (x + y) ** 2 + 0.3 * (x - y) ** 2
+
+    monkeypatch.setattr("rodsight.solver.convex.sliding_model.power_gap", valley)
+    with monkeypatch.context() as patch:
+        patch.setattr("rodsight.solver.convex.sliding_model.ROUNDS", 1)
+        first = fit_model([], GIVEN, ("friction", "base_drag"))
+    found = fit_model([], GIVEN, ("friction", "base_drag"))
+    assert found.gap < first.gap
+    assert found.model.value("friction") == pytest.approx(0.3, rel=0.1)
+
+
+def test_the_friction_of_walls_follows_that_of_grains_in_proportion():
+    model = SlidingModel(0.2, 0.1, 0.05)
+    assert model.with_value("all_friction", 0.3) == SlidingModel(0.3, pytest.approx(0.15), 0.05)
+    assert model.with_value("friction", 0.3) == SlidingModel(0.3, 0.1, 0.05)
 
 
 GAPS = {"friction": 0.4, "wall_friction": 0.4, "base_friction": 0.4, "adhesion": 0.4}
@@ -135,6 +222,80 @@ def test_what_the_input_does_not_state_is_used_where_it_is_clear(frames, monkeyp
     monkeypatch.setattr(resistance, "compare_models", fitted)
     model = find_unstated(frames[2], GIVEN, ("wall_friction", "base_friction"))
     assert (model.wall_friction, model.base_drag, model.friction) == (wall_friction, base_drag, 0.25)
+
+
+def test_a_resistance_is_looked_for_only_where_the_sliding_contradicts_and_is_in_order(frames, monkeypatch):
+    sure = FittedModel(replace(GIVEN, base_drag=0.1), 0.01, True)
+    monkeypatch.setattr(resistance, "compare_models", lambda _, __, rivals, ___: [sure] * len(rivals))
+    for before, back, used in ((0.45, 1.0, True), (0.09, 1.0, False), (0.45, 0.2, False)):
+        gaps = iter([before, back, 0.01])
+        monkeypatch.setattr(resistance, "power_gap", lambda *_, gaps=gaps: next(gaps))
+        assert (find_unstated(frames[2], GIVEN, ["base_friction"]) != GIVEN) == used
+
+
+def test_a_rival_at_the_edge_of_its_trials_counts_as_the_given_model(frames, monkeypatch):
+    edge = FittedModel(replace(GIVEN, base_drag=0.4), 0.01, False)
+    monkeypatch.setattr(resistance, "power_gap", lambda *_: 0.45)
+    monkeypatch.setattr(resistance, "compare_models", lambda _, __, rivals, ___: [edge] * len(rivals))
+    assert find_unstated(frames[2], GIVEN, ["base_friction"]) == GIVEN
+    found = find_resistance(frames[2], GIVEN)
+    assert found is not None
+    assert found.cause == ""
+
+
+@pytest.mark.parametrize(
+    ("before", "gap", "named"), [(0.45, 0.1, True), (0.05, 0.029, False), (0.9, 0.3, False), (0.45, 0.3, False)]
+)
+def test_a_gap_must_fall_by_enough_and_to_little(frames, monkeypatch, before, gap, named):
+    found = FittedModel(replace(GIVEN, friction=0.5), gap, True)
+    monkeypatch.setattr(resistance, "power_gap", lambda *_: before)
+    monkeypatch.setattr(
+        resistance,
+        "compare_models",
+        lambda _, given, rivals, __: [
+            found if each == resistance.RIVALS["friction"] else FittedModel(given, before, True) for each in rivals
+        ],
+    )
+    named_now = find_resistance(frames[2], GIVEN)
+    assert named_now is not None
+    assert named_now.cause == ("friction" if named else "")
+
+
+def test_walls_need_contacts_and_a_friction_limits(frames, monkeypatch):
+    monkeypatch.setattr(resistance, "power_gap", lambda *_: 0.45)
+    compared_sets = []
+
+    def fitted(_, given, rivals, __):
+        compared_sets.append(set(rivals))
+        return [FittedModel(replace(given, friction=0.8), 0.1, True)] * len(rivals)
+
+    monkeypatch.setattr(resistance, "compare_models", fitted)
+    walls = np.mean([each.contacts.with_wall.sum() for each in frames[2]])
+    for least, compared in ((walls, True), (walls + 1.0, False)):
+        monkeypatch.setattr(resistance, "LEAST_WALLS", least)
+        find_resistance(frames[2], GIVEN)
+        assert (resistance.RIVALS["wall_friction"] in compared_sets[-1]) == compared
+    only = {"friction": 0.1}
+    monkeypatch.setattr(
+        resistance,
+        "compare_models",
+        lambda _, given, rivals, __: [
+            FittedModel(replace(given, friction=0.8), only.get(name, 0.45), True)
+            for name, free in resistance.RIVALS.items()
+            if free in rivals
+        ],
+    )
+    found = find_resistance(frames[2], GIVEN)
+    assert found is not None
+    assert found.cause == ""  # more than three times the given friction explains any sliding
+
+
+def test_nothing_is_compared_without_friction_or_with_too_few_photographs():
+    packing, snapshots = sheared_frames(6)
+    unit, settings = force_scale(packing, ChainSettings()), ContactProbabilitySettings(1e-6)
+    smooth = replace(packing, material=replace(packing.material, wall_friction=0.0))
+    assert find_in_sequence(smooth, snapshots, 1, unit, settings) is None
+    assert find_in_sequence(packing, snapshots, 4, unit, settings) is None
 
 
 def test_a_motion_that_fits_in_reverse_order_is_named_first(frames, monkeypatch):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rodsight.solver.dem.boundaries import HEIGHT_RATE, WIDTH_RATE, linkage_motion, move_boundary, wall_surface
 from rodsight.solver.dem.dem_truth import DemSettings
-from rodsight.solver.dem.shear_cell import ShearCell
+from rodsight.solver.dem.shear_cell import FrameSize, ShearCell
 
 SMOOTH = DemSettings(pressure=float("nan"), normal_stiffness=1e6, friction=0.0, wall_friction=0.0)
 RADIUS, DISC = 0.008, 0.05
@@ -26,8 +26,8 @@ def rod_between_discs(settings: DemSettings, shift: float = 0.0, spin: float = 0
     diagonal = 2.0 * (RADIUS + DISC - OVERLAP)
     width, height = np.sqrt(1.0 - SINE**2) * diagonal, SINE * diagonal
     return ShearCell(
-        np.array([RADIUS]), np.array([[width / 2 + shift, height / 2]]), width=width, height=height, settings=settings,
-        velocity=np.array([[0.0, 0.0, spin]]), corner_radius=DISC,
+        np.array([RADIUS]), np.array([[width / 2 + shift, height / 2]]), FrameSize(width, height, corner_radius=DISC),
+        settings, velocity=np.array([[0.0, 0.0, spin]]),
     )  # fmt: skip
 
 

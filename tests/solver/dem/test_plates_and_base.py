@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rodsight.solver.dem.dem_truth import DemFrame, DemSettings, DemTruth
-from rodsight.solver.dem.shear_cell import ShearCell
+from rodsight.solver.dem.shear_cell import FrameSize, ShearCell
 
 HELD = DemSettings(pressure=float("nan"), normal_stiffness=1e6)
 RADIUS = 0.008
@@ -19,7 +19,7 @@ def rods(*place: tuple[float, float], settings: DemSettings = HELD, velocity: tu
          width: float = 1.0, height: float = 1.0) -> ShearCell:  # fmt: skip
     position = np.array(place)
     return ShearCell(
-        np.full(len(position), RADIUS), position, width=width, height=height, settings=settings,
+        np.full(len(position), RADIUS), position, FrameSize(width, height), settings,
         velocity=np.tile(velocity, (len(position), 1)).astype(float),
     )  # fmt: skip
 

@@ -11,7 +11,7 @@ from rodsight.solver.bodies.grains import Grains
 from rodsight.solver.bodies.walls import Walls
 from rodsight.solver.contacts.contacts import Contacts, detect_contacts, measure_contacts
 from rodsight.solver.dem.dem_truth import DemSettings, DemTruth, UnbalancedError
-from rodsight.solver.dem.shear_cell import ShearCell, shear_photographs
+from rodsight.solver.dem.shear_cell import FrameSize, ShearCell, shear_photographs
 from rodsight.synthetic.dense_packing import prepare_packing
 
 # A packing takes some ten thousand steps to prepare: minutes without compilation.
@@ -27,7 +27,7 @@ def collide(settings: DemSettings, velocity: np.ndarray, offset: float = 0.0) ->
     """Collide two rods far from any wall; return the cell and the final velocities."""
     radius = np.array([0.008, 0.011])
     position = np.array([[0.5, 0.5], [0.5 + np.sqrt(0.0191**2 - offset**2), 0.5 + offset]])
-    cell = ShearCell(radius, position, width=1.0, height=1.0, settings=settings, velocity=velocity)
+    cell = ShearCell(radius, position, FrameSize(1.0, 1.0), settings, velocity=velocity)
     cell.run(np.zeros(3000))
     return cell, cell.velocity
 
@@ -82,7 +82,7 @@ def test_rod_on_an_incline_rolls_or_slides_as_friction_allows(degrees: float, sl
     radius = np.array([0.008])
     weight = settings.density * settings.length * np.pi * radius[0] ** 2 * gravity
     rest = radius[0] - weight * np.cos(slope) / settings.normal_stiffness
-    cell = ShearCell(radius, np.array([[0.1, rest]]), width=1.0, height=0.5, settings=settings)
+    cell = ShearCell(radius, np.array([[0.1, rest]]), FrameSize(1.0, 0.5), settings)
     steps = 4000
     cell.run(np.zeros(steps))
     vx, _, spin = cell.velocity[0]
@@ -99,9 +99,8 @@ def test_rod_that_slides_to_the_right_drags_the_bottom_to_the_right() -> None:
     cell = ShearCell(
         np.array([0.008]),
         np.array([[0.1, 0.008]]),
-        width=1.0,
-        height=0.5,
-        settings=settings,
+        FrameSize(1.0, 0.5),
+        settings,
         velocity=np.array([[0.5, 0.0, 0.0]]),
     )
     cell.run(np.zeros(600))  # 0.03 s: settled on the wall, and rolling only after v / 3μg = 0.07 s
@@ -115,7 +114,7 @@ def test_rod_that_slides_to_the_right_drags_the_bottom_to_the_right() -> None:
 def test_rod_squeezed_by_the_plate_rolls_at_half_its_speed() -> None:
     radius, overlap, rate = 0.008, 1e-6, 0.5
     height = 2.0 * (radius - overlap)
-    cell = ShearCell(np.array([radius]), np.array([[0.5, height / 2]]), width=1.0, height=height, settings=HELD)
+    cell = ShearCell(np.array([radius]), np.array([[0.5, height / 2]]), FrameSize(1.0, height), HELD)
     cell.run(np.full(3000, rate))
     vx, vy, spin = cell.velocity[0]
     speed = height * rate / np.cos(cell.shear) ** 2
@@ -129,7 +128,7 @@ def test_rod_between_rotating_sides_stays_midway() -> None:
     radius, overlap = 0.008, 5e-6
     width = 2.0 * (radius - overlap)
     settings = replace(HELD, friction=0.0, wall_friction=0.0)
-    cell = ShearCell(np.array([radius]), np.array([[width / 2, 0.25]]), width=width, height=0.5, settings=settings)
+    cell = ShearCell(np.array([radius]), np.array([[width / 2, 0.25]]), FrameSize(width, 0.5), settings)
     cell.run(np.full(1500, 1.0))
     x, y = cell.position[0]
     sideways = (x - width / 2) * np.cos(cell.shear) - y * np.sin(cell.shear)
@@ -141,7 +140,7 @@ def test_pause_stops_only_rods_without_contact() -> None:
     settings = replace(HELD, pause_limit=250, gravity=(0.0, -9.81))
     velocity = np.array([[0.05, 0.02, 3.0], [0.5, 0.0, 0.0]])
     position = np.array([[0.5, 0.5], [0.2, 0.008 - 3e-7]])  # in the air; sliding on the bottom
-    cell = ShearCell(np.full(2, 0.008), position, width=1.0, height=1.0, settings=settings, velocity=velocity)
+    cell = ShearCell(np.full(2, 0.008), position, FrameSize(1.0, 1.0), settings, velocity=velocity)
     assert cell.rest() == settings.pause_limit
     assert cell.touching.tolist() == [False, True]
     np.testing.assert_array_equal(cell.velocity[0], 0.0)
@@ -270,7 +269,7 @@ def test_moving_packing_is_refused_as_truth() -> None:
 
 
 def test_photograph_without_any_contact_is_refused() -> None:
-    cell = ShearCell(np.array([0.008]), np.array([[0.5, 0.5]]), width=1.0, height=1.0, settings=HELD)
+    cell = ShearCell(np.array([0.008]), np.array([[0.5, 0.5]]), FrameSize(1.0, 1.0), HELD)
     with pytest.raises(UnbalancedError, match="photograph 0"):
         DemTruth.of_frames(cell.grains.radius, [cell.photograph(0)], HELD)
 

@@ -7,6 +7,7 @@ from rodsight.solver.bodies.walls import Walls
 from rodsight.solver.contacts.contacts import detect_contacts
 from rodsight.solver.convex.program import (
     ConvexSettings,
+    LoadScale,
     assemble_balance,
     project_onto_equilibrium,
     solve_convex_member,
@@ -42,7 +43,7 @@ def lattice(left_out=0):
     def balance_of(listed):
         return assemble_balance(
             listed, grains, walls, present=np.ones(grains.count, bool), friction=np.full(listed.count, 0.25),
-            force_unit=UNIT,
+            scale=LoadScale(UNIT),
         )  # fmt: skip
 
     none = np.zeros(contacts.count)

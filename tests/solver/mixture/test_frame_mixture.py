@@ -11,6 +11,7 @@ from rodsight.solver.mixture.frame_mixture import (
     HALF_WEIGHT_OVERLAP,
     MIN_OFFERED_PROBABILITY,
     ForceEstimate,
+    Softness,
     mix_on_contacts,
     motion_weight,
     offered_pairs,
@@ -60,7 +61,7 @@ def r(a: np.ndarray, b: np.ndarray) -> float:
 def test_mixture_is_better_than_either_and_has_the_sum_of_the_motion(fields) -> None:
     truth, one, two = fields
     positions = make_posterior(5.0 * two)
-    found = mix_on_contacts(some_contacts(), make_motion(one), positions, 0.9, scale_known=True, soft_trust=None)
+    found = mix_on_contacts(some_contacts(), make_motion(one), positions, 0.9, scale_known=True)
     assert r(found.fn, truth) > max(r(one, truth), r(two, truth)) + 0.01
     assert found.fn.sum() == pytest.approx(one.sum())
     assert found.trust < r(found.fn, truth) + 0.03
@@ -70,18 +71,14 @@ def test_mixture_is_better_than_either_and_has_the_sum_of_the_motion(fields) -> 
 def test_without_load_the_weight_follows_from_the_bound(fields) -> None:
     _, one, two = fields
     given = some_contacts(), make_motion(one), make_posterior(two), 0.9
-    confirmed, alone = (
-        mix_on_contacts(*given, scale_known=each, soft_trust=None).position_weight for each in (True, False)
-    )
+    confirmed, alone = (mix_on_contacts(*given, scale_known=each).position_weight for each in (True, False))
     assert alone > confirmed + 0.05
 
 
 @pytest.mark.unit
 def test_standard_deviation_contains_the_difference_of_both(fields) -> None:
     _, one, two = fields
-    found = mix_on_contacts(
-        some_contacts(), make_motion(one), make_posterior(two), 0.9, scale_known=True, soft_trust=None
-    )
+    found = mix_on_contacts(some_contacts(), make_motion(one), make_posterior(two), 0.9, scale_known=True)
     apart = np.abs(one - one.sum() / two.sum() * two)
     far, near = apart > np.quantile(apart, 0.9), apart < np.quantile(apart, 0.1)
     assert found.fn_sd[far].min() > found.fn_sd[near].max()
@@ -92,7 +89,7 @@ def test_standard_deviation_contains_the_difference_of_both(fields) -> None:
 def test_variances_are_those_of_a_mixture_of_two_distributions(fields) -> None:
     _, one, two = fields
     motion, positions = make_motion(one), make_posterior(5.0 * two)
-    found = mix_on_contacts(some_contacts(), motion, positions, 0.9, scale_known=True, soft_trust=None)
+    found = mix_on_contacts(some_contacts(), motion, positions, 0.9, scale_known=True)
     u, q = found.position_weight, one.sum() / (5.0 * two.sum())
     assert 0.1 < u < 0.9
     for sd, m, p, m_sd, p_sd in (
@@ -108,13 +105,13 @@ def test_overlaps_of_soft_grains_have_all_the_weight_and_their_own_scale(fields)
     _, one, two = fields
     positions = make_posterior(3.0 * two)
     found = mix_on_contacts(
-        some_contacts(), make_motion(one), positions, 0.9, scale_known=True, soft_trust=0.6, weight=0.0
+        some_contacts(), make_motion(one), positions, 0.9, scale_known=True, softness=Softness(0.6, 0.0)
     )
     assert found.fn == pytest.approx(3.0 * two)
     assert found.position_weight == 1.0
     assert found.trust == 0.6
     scaled = mix_on_contacts(
-        some_contacts(), make_motion(one), positions, 0.9, scale_known=False, soft_trust=0.6, weight=0.0
+        some_contacts(), make_motion(one), positions, 0.9, scale_known=False, softness=Softness(0.6, 0.0)
     )
     assert scaled.fn.sum() == pytest.approx(one.sum())
 
@@ -123,8 +120,8 @@ def test_overlaps_of_soft_grains_have_all_the_weight_and_their_own_scale(fields)
 def test_motion_of_slightly_pressed_grains_has_the_weight_of_hard_ones(fields) -> None:
     _, one, two = fields
     given = some_contacts(), make_motion(one), make_posterior(3.0 * two), 0.9
-    hard = mix_on_contacts(*given, scale_known=True, soft_trust=None)
-    found = mix_on_contacts(*given, scale_known=True, soft_trust=0.6, weight=1.0)
+    hard = mix_on_contacts(*given, scale_known=True)
+    found = mix_on_contacts(*given, scale_known=True, softness=Softness(0.6))
     np.testing.assert_allclose(found.fn, hard.fn)
     np.testing.assert_allclose(found.fn_sd, hard.fn_sd)
     assert found.trust == pytest.approx(hard.trust)
@@ -135,13 +132,13 @@ def test_weight_and_scale_lie_between_those_of_soft_and_hard_grains(fields) -> N
     _, one, two = fields
     given = some_contacts(), make_motion(one), make_posterior(3.0 * two), 0.9
     found = [
-        mix_on_contacts(*given, scale_known=True, soft_trust=0.6, weight=weight) for weight in (1.0, 0.5, 0.1, 0.0)
+        mix_on_contacts(*given, scale_known=True, softness=Softness(0.6, weight)) for weight in (1.0, 0.5, 0.1, 0.0)
     ]
     assert np.all(np.diff([each.position_weight for each in found]) > 0.0)
     assert np.all(
         np.diff([each.fn.sum() for each in found]) > 0.0
     )  # from the motion's sum to that of the positions, three times as large
-    guess = mix_on_contacts(*given[:3], np.nan, scale_known=True, soft_trust=0.6, weight=1.0)
+    guess = mix_on_contacts(*given[:3], np.nan, scale_known=True, softness=Softness(0.6))
     np.testing.assert_allclose(guess.fn, 3.0 * two)  # no motion leads to the frame
 
 
@@ -163,11 +160,11 @@ def test_only_bearing_pairs_are_offered() -> None:
 def test_bearing_probability_is_matched_to_the_contacts_of_the_frame(fields) -> None:
     _, one, two = fields
     positions = make_posterior(two[:-1], bearing_probability=np.linspace(0.0, 1.0, C - 1))
-    found = mix_on_contacts(some_contacts(), make_motion(one), positions, 0.8, scale_known=True, soft_trust=None)
+    found = mix_on_contacts(some_contacts(), make_motion(one), positions, 0.8, scale_known=True)
     # The keys of a packing with one grain less are others: only what has the same key counts.
     assert found.bearing_probability.shape == (C,)
     same = replace(positions, contacts=some_contacts().select(np.arange(C - 1)))
-    again = mix_on_contacts(some_contacts(), make_motion(one), same, 0.8, scale_known=True, soft_trust=None)
+    again = mix_on_contacts(some_contacts(), make_motion(one), same, 0.8, scale_known=True)
     assert again.bearing_probability[:-1] == pytest.approx(np.linspace(0.0, 1.0, C - 1))
     assert again.bearing_probability[-1] == 0.0
 
@@ -176,10 +173,10 @@ def test_bearing_probability_is_matched_to_the_contacts_of_the_frame(fields) -> 
 def test_without_motion_the_loads_give_the_scale(fields) -> None:
     _, one, two = fields
     guess, positions = make_motion(3.0 * one), make_posterior(two)
-    found = mix_on_contacts(some_contacts(), guess, positions, np.nan, scale_known=True, soft_trust=None)
+    found = mix_on_contacts(some_contacts(), guess, positions, np.nan, scale_known=True)
     np.testing.assert_allclose(found.fn, two)
     np.testing.assert_allclose(found.fn_sd, 0.3)
-    unknown = mix_on_contacts(some_contacts(), guess, positions, np.nan, scale_known=False, soft_trust=None)
+    unknown = mix_on_contacts(some_contacts(), guess, positions, np.nan, scale_known=False)
     assert unknown.fn.sum() == pytest.approx(guess.fn.sum())
 
 

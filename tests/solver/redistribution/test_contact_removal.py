@@ -158,7 +158,7 @@ def test_moved_normals_carry_the_same_loads(patch) -> None:
     turned[rows] = turned[rows] @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     moved = replace(contacts, normal=turned)
     friction = np.full(len(fn), MU)
-    new_fn, new_ft = rebalance(grains, contacts, fn, ft, rows, friction=friction, moved=moved)
+    new_fn, new_ft = rebalance(grains, contacts, np.stack([fn, ft]), rows, friction=friction, moved=moved)
     before = carried(grains, contacts, fn, ft)
     np.testing.assert_allclose(carried(grains, moved, new_fn, new_ft), before, atol=3.0 * CLOSE * fn.mean())
     assert np.abs(carried(grains, contacts, new_fn, new_ft) - before).max() > 0.01 * fn.mean()

@@ -10,6 +10,7 @@ from rodsight.solver.bodies.grains import Grains
 from rodsight.solver.frame_forces import FrameStatus
 from rodsight.solver.sequence import frames as sequence
 from rodsight.solver.sequence.failure import find_fault
+from rodsight.solver.sequence.frames import SequencePart
 
 from tests.solver.sequence.test_frames import ENSEMBLE, SETTINGS, run, sheared_frames, solved_heap
 
@@ -117,7 +118,7 @@ def test_a_sequence_resumes_after_a_failed_frame_bit_for_bit():
     packing, snapshots = sheared_frames(COUNT)
     snapshots[BAD] = blank(snapshots[BAD])
     whole = solve_with_fault(ENSEMBLE, blank)
-    resumed = run(packing, snapshots, ENSEMBLE, state=whole[BAD][1], first=BAD + 1)
+    resumed = run(packing, snapshots, ENSEMBLE, part=SequencePart(BAD + 1, [whole[BAD][1]]))
     for (frame, _), (again, _) in zip(whole[BAD + 1 :], resumed, strict=True):
         assert np.array_equal(frame.fn, again.fn)
 

@@ -16,7 +16,7 @@ from rodsight.solver.nlgs.chain import ChainSettings
 from rodsight.solver.nlgs.force_memory import ForceMemory
 from rodsight.solver.nlgs.sweep_record import recorded_sweeps
 from rodsight.solver.sequence import ensemble
-from rodsight.solver.sequence.frames import solve_sequence
+from rodsight.solver.sequence.frames import SequencePart, solve_sequence
 from rodsight.solver.sequence.settings import SequenceSettings
 from rodsight.solver.sequence.state import SequenceState
 
@@ -59,7 +59,7 @@ def solved_heap(settings=SETTINGS, count=4):
 def test_a_sequence_resumes_from_a_stored_state_bit_for_bit(settings):
     packing, snapshots = sheared_frames(5)
     whole = solved_heap(settings, 5)
-    resumed = run(packing, snapshots, settings, state=whole[2][1], first=3)
+    resumed = run(packing, snapshots, settings, part=SequencePart(3, [whole[2][1]]))
     for (frame, _), (again, _) in zip(whole[3:], resumed, strict=True):
         assert np.array_equal(frame.fn, again.fn)
         assert np.array_equal(frame.ft, again.ft)
@@ -264,7 +264,7 @@ def test_a_pair_confirmed_by_a_reviewer_is_certain_whatever_its_gaps():
     uncertain = detected.contacts.key[[np.argmin(detected.probability)]]
     assert detected.probability.min() < 0.9
     verdicts = {2: Verdicts(forced=uncertain)}
-    ((frame, state),) = run(packing, snapshots, ENSEMBLE, verdicts=verdicts, state=before, first=2)
+    ((frame, state),) = run(packing, snapshots, ENSEMBLE, part=SequencePart(2, [before]), verdicts=verdicts)
     assert state.members.pairs.of(uncertain) == 1.0
     assert frame.probability[frame.contacts.key == uncertain] == detected.probability.min()  # as detected
 
@@ -302,9 +302,9 @@ def test_the_return_from_a_faulty_frame_is_no_jump_of_the_stress():
     state = run(packing, snapshots)[2][1]
     state = replace(state, sound_pressure=state.pressure)
     faulty = replace(state, pressure=3.0 * state.pressure)
-    (_, after), *_ = run(packing, snapshots, state=faulty, first=3)
-    (_, sound), *_ = run(packing, snapshots, state=state, first=3)
+    (_, after), *_ = run(packing, snapshots, part=SequencePart(3, [faulty]))
+    (_, sound), *_ = run(packing, snapshots, part=SequencePart(3, [state]))
     assert after.evidence.pressure_jump == sound.evidence.pressure_jump
     never_sound = replace(faulty, sound_pressure=np.nan)
-    (_, jumped), *_ = run(packing, snapshots, state=never_sound, first=3)
+    (_, jumped), *_ = run(packing, snapshots, part=SequencePart(3, [never_sound]))
     assert jumped.evidence.pressure_jump > after.evidence.pressure_jump

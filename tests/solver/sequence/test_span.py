@@ -10,7 +10,7 @@ from rodsight.solver.contacts.verdicts import Verdicts
 from rodsight.solver.frame_forces import FrameStatus
 from rodsight.solver.nlgs.chain import ChainSettings
 from rodsight.solver.sequence import frames as frames_module
-from rodsight.solver.sequence.frames import solve_sequence
+from rodsight.solver.sequence.frames import SequencePart, solve_sequence
 from rodsight.solver.sequence.settings import SequenceSettings
 
 from tests.solver.sequence.test_frames import sheared_frames
@@ -94,7 +94,7 @@ def test_a_sequence_resumes_from_the_last_states_bit_for_bit(first):
     packing, snapshots = sheared_frames(FRAMES)
     whole = solve(THREE)
     states = [state for _, state in whole[max(first - 3, 0) : first]]
-    resumed = solve_sequence(packing, snapshots, THREE, state=states[-1], earlier=states[:-1], first=first)
+    resumed = solve_sequence(packing, snapshots, THREE, SequencePart(first, states))
     for (frame, _), (again, _) in zip(whole[first:], resumed, strict=True):
         assert np.array_equal(frame.fn, again.fn)
         assert np.array_equal(frame.age, again.age)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rodsight.inference.correction.outliers import find_outliers
+from rodsight.inference.correction.radii import find_wrong_sizes
 from rodsight.inference.diagnosis.direct_tests import (
     examine_inertia,
     examine_order,
@@ -161,6 +162,21 @@ def test_a_size_whose_rods_overlap_alone_is_named(factors, named):
     assert [each.cause for each in found] == (["class_radii"] if named else [])
     if named:
         assert "rods of radius 8.16 mm overlap by 2.0 % of a diameter" in found[0].evidence
+
+
+def test_small_overlaps_and_photographs_that_failed_show_no_wrong_size(monkeypatch):
+    monkeypatch.setattr("tests.app.inference.diagnosis.test_direct_tests.NOISE", 1e-8)
+    exact = rolling_tracks()
+    in_odd_layer = (np.arange(N) // SIDE) % 2 == 1
+    for factor, named in ((1.0015, False), (1.003, True)):
+        tracks = replace(exact, radius=RADIUS * np.where(in_odd_layer, factor, 1.0))
+        assert bool(find_wrong_sizes(tracks, box())) == named
+    tracks = replace(exact, radius=RADIUS * np.where(in_odd_layer, 0.99, 1.0))
+    assert find_wrong_sizes(tracks, box()) == {}
+    squeezed = tracks.position.copy()
+    squeezed[3, in_odd_layer, 0] *= 0.9
+    tracks = replace(tracks, position=squeezed)
+    assert find_wrong_sizes(tracks, box(), failed=[3]) == {}
 
 
 def test_fast_shear_is_named():

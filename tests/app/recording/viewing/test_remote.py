@@ -15,7 +15,7 @@ from typing import IO
 
 import pytest
 from playwright.sync_api import Page
-from rodsight.synthetic.synthesis import synthesize
+from rodsight.synthetic.synthesis import SynthesisSettings, synthesize
 
 from tests.browser import open_when_served, wait_for_forces
 from tests.program import RODSIGHT
@@ -146,7 +146,7 @@ def running(process: subprocess.Popen) -> Iterator[subprocess.Popen]:
 
 def test_a_run_on_another_machine_is_watched_through_ssh_only(machine: Machine, tmp_path: Path, page: Page):
     experiment = tmp_path / "far"
-    synthesize(experiment, grains=120, frames=12, photographs=False, noise=1e-5, seed=1)
+    synthesize(experiment, SynthesisSettings(grains=120, frames=12, photographs=False, noise=1e-5, seed=1))
     command = [*RODSIGHT, "run", experiment, "--view", "web", "--out", tmp_path / "out"]
     command += ["--set", "solver.sweeps=60000"]  # long enough to be watched
     with running(machine.start(*command, stdout=subprocess.PIPE, text=True)) as run:
