@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.mutation.table import MUTANTS
+
 ROOT = Path(__file__).resolve().parents[2]
 MOST_PARAMETERS = 7
 MOST_FILES, MOST_AT_THE_ROOT = 12, 9
@@ -67,3 +69,10 @@ def test_rooms_have_few_files_and_files_few_lines():
     assert rooms["app"] <= MOST_AT_THE_ROOT
     lines = {file.relative_to(ROOT).as_posix(): file.read_text(encoding="utf-8").count("\n") for file in sources()}
     assert {name for name, count in lines.items() if count > MOST_LINES} == LONG
+
+
+def test_every_mutant_has_its_text_once_and_its_tests():
+    assert len({(mutant.place, mutant.old, mutant.new) for mutant in MUTANTS}) == len(MUTANTS) >= 100
+    for mutant in MUTANTS:
+        mutant.locate(ROOT)
+        assert all((ROOT / test).exists() for test in mutant.tests)

@@ -184,7 +184,7 @@ def _fringes(layout: RecordingLayout) -> rrb.Container:
         rrb.Horizontal(
             drawn_view("Forces on a disc over its fringes", "/fringes/plot", *FRINGE_BOUNDS),
             curve_view("Correlation of fringes and forces", [entities.FRINGE_CORRELATION, entities.TRUST],
-                       y_range=_UNIT_RANGE, corner=_LOW),
+                       _UNIT_RANGE, corner=_LOW),
         ),
         row_shares=[2.0, 1.0],
         name=Tab.FRINGES,
