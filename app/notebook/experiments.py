@@ -90,13 +90,11 @@ def init(folder: str | PathLike[str], photographs: str, **options: Unpack[InitOp
     --------
     >>> rodsight.init("nothing", "*.jpg")
     Traceback (most recent call last):
-    rodsight.process.errors.InputError: nothing: is no folder; give the one that holds the photographs
+    rodsight.process.errors.InputError: nothing: photographs.files = '*.jpg': no file matches
     """
     from ..workbench.setup.initialise import SetupFlags, initialise
 
     place = Path(folder)
-    if not place.is_dir():
-        raise InputError(place, "", "is no folder; give the one that holds the photographs")
     unknown = sorted(set(options) - InitOptions.__annotations__.keys())
     if unknown:
         raise InputError("init", unknown[0], f"is not an option: there are {', '.join(InitOptions.__annotations__)}")

@@ -27,8 +27,6 @@ SIGNS = {"good": "✓", "doubtful": "!", "missing": "·"}
 
 def initialise_experiment(folder: Path, flags: SetupFlags, *, quiet: bool) -> int:
     """Set an experiment up from flags, and print the state of every step; return the exit status."""
-    if not folder.is_dir():
-        raise InputError(folder, "", "is no folder; give the one that holds the photographs, or a folder of them")
     found = initialise(folder, flags)
     console = Console(quiet=quiet)
     for step in found.steps.values():

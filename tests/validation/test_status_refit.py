@@ -13,7 +13,7 @@ from rodsight.study.truths import simulate
 
 GRAINS, SEEDS = 250, (31, 32)
 NOISES = (0.0, 1e-5, 4e-5)
-BELOW_TRUST, FAR_BELOW = 0.12, 0.03  # fractions of valid frames with r < T, r < T − .03; fitted for .06 and < .01
+FAR_BELOW = 0.03  # fraction of valid frames with r < T − .03, as the trust claims
 COVERED_ONCE, COVERED_TWICE = (0.6, 0.8), (0.9, 0.985)  # of one and two standard deviations
 WRONG = 0.85  # r below which a frame should not have the status settled
 UNDETECTED = 0.05  # greatest fraction of such frames with that status
@@ -34,7 +34,6 @@ def valid(sample: StatusSample) -> np.ndarray:
 def test_trust_is_a_conservative_estimate_of_the_correlation(sample):
     t = np.array([motion_assessment(each).trust for each in sample.evidence])[valid(sample)]
     r = sample.r[valid(sample)]
-    assert np.mean(r < t) <= BELOW_TRUST
     assert np.mean(r < t - 0.03) <= FAR_BELOW
     assert t.mean() > r.mean() - 0.1  # conservative, not useless
 
@@ -57,6 +56,6 @@ def test_constants_can_be_refitted_by_one_call(tmp_path):
     console = Console(record=True, width=160)
     fit = refit_status((33,), (34,), grains=(GRAINS,), folder=tmp_path, console=console, noises=(1e-5,))
     text = console.export_text()
-    assert "TRUST_DISAGREEMENT" in text
+    assert "motion_reliability.disagreement" in text
     assert "packings held out" in text
     assert all(value >= 0.0 for value in (*fit.disagreement, *fit.correction, *fit.normal, *fit.tangent))

@@ -64,7 +64,7 @@ class SetupFlags:
 
 
 def initialise(folder: Path, flags: SetupFlags) -> ValidationResult:
-    """Write experiment.toml, grains.csv, walls.csv and a picture to check them by.
+    """Write experiment.toml, grains.csv, walls.csv and a picture to check them by, in a folder that may be new.
 
     Raises
     ------
@@ -75,10 +75,27 @@ def initialise(folder: Path, flags: SetupFlags) -> ValidationResult:
     if draft.file.exists():
         raise InputError(draft.file, "", "is there already: change it by rodsight open, or delete it")
     with ExitStack() as on_failure:
+        if not folder.is_dir():
+            _make(folder)
+            on_failure.callback(_remove_empty, folder)
         flags, video = _without_video(folder, flags, on_failure)
         found = _initialise(folder, draft, flags, video)
         on_failure.pop_all()
     return found
+
+
+def _make(folder: Path) -> None:
+    """Create a folder in one that exists: a wrong path is an error, and not a tree of folders."""
+    if folder.exists():
+        raise InputError(folder, "", "is no folder; give the one that holds the photographs, or a new one")
+    if not folder.absolute().parent.is_dir():
+        raise InputError(folder, "", "cannot be created: the folder that should hold it does not exist")
+    folder.mkdir()
+
+
+def _remove_empty(folder: Path) -> None:
+    if not any(folder.iterdir()):
+        folder.rmdir()
 
 
 def _initialise(folder: Path, draft: Draft, flags: SetupFlags, video: list[str]) -> ValidationResult:

@@ -126,10 +126,11 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
         synthesize(shear, SynthesisSettings(grains=20, frames=4, seed=12, pixel_size=PIXEL))
         table = pd.read_csv(ROOT / "sample_data/campaign.csv").assign(frames="0:2")
         table.tail(2).to_csv(folder / "sample_data/campaign.csv", index=False)
-        for name in ("my_test", "my_photographs"):
+        for name in ("my_test", "my_photographs", "big", "try", "lab"):
             shutil.copytree(shear, folder / name)
             config = folder / name / "experiment.toml"
             config.write_text(config.read_text().replace('name = "shear"', f'name = "{name}"'))
+        for name in ("my_test", "my_photographs"):
             for file in sorted((shear / "photos").iterdir()):  # as in the pages: PNG with smaller pixels
                 picture = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
                 assert picture is not None
@@ -139,8 +140,6 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
             source = "my_test" if name == "my_test" else f"sample_data/{name}"
             setting = ("--set", "solver.kappa=0.1") if out == "stiffer" else ()
             assert rodsight("run", source, "--out", f"runs/{out}", *setting) == 0
-        for name in ("big", "try"):
-            shutil.copytree(shear, folder / name)
         shutil.copytree("runs/shear", "runs/campaign/shear")  # as a campaign writes it
         _write_foreign_files(folder)
     return folder

@@ -37,6 +37,21 @@ def test_an_experiment_that_is_there_is_not_overwritten(folder, capsys):
     assert file.read_text() == "name = 'mine'\n"
 
 
+def test_a_new_folder_is_made_beside_the_photographs_and_goes_if_nothing_is_made(tmp_path, capsys):
+    discs(tmp_path)
+    flags = ("--photographs", "../shots/*.png", "--channel", "red", "--pixel-size", "1e-4", "--interval", "1")
+    assert rodsight("init", tmp_path / "new", *flags, "--quiet") == 0
+    assert load_experiment(tmp_path / "new").config.name == "new"
+    assert rodsight("init", tmp_path / "other", "--photographs", "../none/*.png") == 2
+    assert "no file matches" in capsys.readouterr().err
+    assert not (tmp_path / "other").exists()
+    assert rodsight("init", tmp_path / "no" / "such", *flags) == 2
+    assert "cannot be created" in capsys.readouterr().err
+    (tmp_path / "file").touch()
+    assert rodsight("init", tmp_path / "file", *flags) == 2
+    assert "is no folder" in capsys.readouterr().err
+
+
 @pytest.mark.screen
 def test_flags_make_an_experiment_and_a_picture(folder, made_photographs):
     section = load_experiment(made_photographs).config.photographs
