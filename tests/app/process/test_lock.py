@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from dataclasses import asdict, replace
@@ -127,3 +128,40 @@ def test_a_process_that_has_ended_does_not_live_although_its_status_was_not_read
     os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)  # ended, and still listed
     assert not holder.is_alive
     process.communicate()
+
+
+def test_a_number_that_is_used_again_is_another_process(tmp_path):
+    assert Holder.this().is_alive
+    assert not replace(Holder.this(), began="0").is_alive
+
+
+def test_a_folder_that_was_made_for_nothing_is_removed(tmp_path):
+    with hold_folder(tmp_path / "runs" / "test", print):
+        pass
+    assert list(tmp_path.iterdir()) == []
+    with hold_folder(tmp_path / "runs" / "test", print):
+        (tmp_path / "runs" / "test" / "results").touch()
+    assert (tmp_path / "runs" / "test" / "results").exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes do not fork here")
+def test_a_child_that_outlives_its_parent_does_not_hold_its_folder(tmp_path):
+    in_child = "if os.fork() == 0:\n        print(os.getpid(), flush=True)\n    sys.stdin.read()"
+    forking = HOLDING.replace("sys.stdin.read()", in_child)
+    process = subprocess.Popen(
+        [sys.executable, "-c", f"import os\n{forking}", str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        text=True,
+    )  # fmt: skip
+    assert process.stdout is not None
+    assert process.stdout.readline() == "held\n"
+    child = int(process.stdout.readline())
+    process.kill()
+    process.wait()
+    try:
+        notes: list[str] = []
+        with hold_folder(tmp_path, notes.append):
+            pass
+        assert len(notes) == 1
+    finally:
+        os.kill(child, signal.SIGKILL)
+        process.communicate()

@@ -48,3 +48,38 @@ def test_points_are_at_the_times_that_were_set(tmp_path):
     stream.disconnect()
     found = rows(tmp_path / "points.rrd", "/curve")
     assert [(row["frame"], row["Scalars:scalars"]) for row in found] == [(0, [1.5]), (1, []), (2, [2.5])]
+
+
+class Sent:
+    """A stream that notes the numbers of rows that it is sent."""
+
+    def __init__(self) -> None:
+        self.rows: list[tuple[str, int]] = []
+
+    def send_columns(self, path, when, columns) -> None:
+        self.rows.append((path, len(next(iter(columns)).as_arrow_array())))
+
+
+def test_rows_are_sent_once_they_are_large_and_points_may_wait(monkeypatch):
+    stream = Sent()
+    batches = row_batches.RowBatches(stream)
+
+    def add(frame: int) -> None:
+        when = [rr.TimeColumn("frame", sequence=[frame])]
+        batches.add("/rows", when, rr.Scalars.columns(scalars=[1.0]))
+
+    monkeypatch.setattr(row_batches, "LARGEST", 10**9)
+    add(0)
+    one_row = next(iter(batches._rows.values())).size
+    monkeypatch.setattr(row_batches, "LARGEST", 3 * one_row)
+    add(1)
+    assert stream.rows == []
+    add(2)
+    assert stream.rows == [("/rows", 3)]
+    add(3)
+    batches.begin((("frame", 3),))
+    batches.add_point("/curve", [1.0])
+    batches.send(points=False)
+    assert stream.rows[1:] == [("/rows", 1)]
+    batches.send()
+    assert stream.rows[2:] == [("/curve", 1)]
