@@ -26,7 +26,6 @@ TOUCHES_FREE = 2  # bodies that any rod can touch by its choice of place
 LEAST_HELD = 0.45  # mean number of further contacts per photograph that is significant …
 LEAST_TOUCHES = 5.0  # … and their least number in all photographs together
 TOLERATED = 0.25  # fraction of photographs in which the rod may overlap another body
-CROWDED = 0.5  # of the smaller radius: two rods nearer than that are one
 STARTS = 4  # photographs in which places are searched, evenly spaced
 TRIED = 12  # trial radii where rods have no classes
 PASSES = 6  # each with the rods of the one before

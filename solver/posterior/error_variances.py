@@ -24,7 +24,6 @@ class ErrorVariances:
 
     radius: float  # σ_r² [m²], common to all gaps of a grain, overlap included
     centre: float  # σ_c² [m²], of a centre's coordinate
-    pair_weight: float  # total weight of the pairs of gaps behind the estimate
 
     def radius_sd(self, overlap: float) -> float:
         """Compute the standard deviation of the radii [m], given the mean overlap [m] of touching surfaces.
@@ -60,9 +59,9 @@ def estimate_error_variances(frames: list[tuple[Contacts, Array, Array]]) -> Err
         normal_matrix += part
         right += side
     if not normal_matrix[0, 0] > 0.0:
-        return ErrorVariances(0.0, 0.0, 0.0)
+        return ErrorVariances(0.0, 0.0)
     radius, centre = np.linalg.lstsq(normal_matrix, right, rcond=1e-9)[0]
-    return ErrorVariances(max(float(radius), 0.0), max(float(centre), 0.0), float(normal_matrix[0, 0]))
+    return ErrorVariances(max(float(radius), 0.0), max(float(centre), 0.0))
 
 
 def _sum_products(contacts: Contacts, rest: Array, weight: Array) -> tuple[Array, Array]:

@@ -48,10 +48,6 @@ class Clock:
         """Set the time of the next data to the last row of the frame."""
         self._set(self.last)
 
-    def frame_only(self) -> None:
-        """Set the time of the next data to the frame, without a value on `sweep`."""
-        self._set(None)
-
     def _set(self, sweep: int | None) -> None:
         moment: dict[str, int | np.timedelta64] = {entities.FRAME: self.frame}
         if np.isfinite(self.time):

@@ -28,7 +28,6 @@ NUMBERED = {  # tables whose rows belong to a photograph: section and keys
     "photographs": ("times", "corrections"), "walls": ("file", "arcs", "corners", "load", "forces"),
     "boundary": ("periodic",), "": ("truth", "truth_tracks"),
 }  # fmt: skip
-FROM_CLOCK = 1e-3  # [s] to which times of a camera are stored
 
 
 def describe_series(found: ValidationResult) -> dict[str, Any]:

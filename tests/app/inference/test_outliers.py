@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rodsight.inference.correction.outliers import find_outliers, remove_outliers
+from rodsight.solver.bodies.wall_shapes import IN, circle_ends
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
 FRAMES, SIDE, PITCH, NOISE = 6, 7, 0.016, 1e-5
@@ -107,3 +108,38 @@ def test_lost_rods_and_few_frames_are_no_obstacle():
     lost = replace(tracks, position=position)
     assert np.argwhere(find_outliers(lost)).tolist() == [[2, ROD]]
     assert np.isnan(remove_outliers(lost)[0].position[3, 0]).all()
+
+
+def test_a_jump_that_is_possible_but_undone_is_an_outlier():
+    tracks = sheared_tracks([(2, ROD, (1.7e-4, 0.0))])  # onto its neighbour, by less than noise allows
+    tracks = replace(tracks, radius=np.full(N, 0.00794))
+    assert np.argwhere(find_outliers(tracks)).tolist() == [[2, ROD]]
+    assert not find_outliers(sheared_tracks([(2, ROD, (0.0, 5e-5))])).any()
+
+
+def test_a_rod_that_goes_on_as_before_is_no_outlier_at_the_end():
+    tracks = sheared_tracks([(k, ROD, (4e-4 * k, 0.0)) for k in range(1, FRAMES)])
+    assert not find_outliers(tracks).any()
+
+
+@pytest.mark.parametrize(("move", "found"), [(8e-4, True), (1e-4, False)])
+def test_an_impossible_pose_overlaps_by_more_than_all_others(move, found):
+    tracks = sheared_tracks([(0, ROD, (move, 0.0))])
+    assert find_outliers(replace(tracks, radius=np.full(N, 0.00803)))[0, ROD] == found
+
+
+def test_a_rod_inside_another_in_two_photographs_is_found_in_both():
+    rng = np.random.default_rng(5)
+    quiet = sheared_tracks([(2, ROD, (8e-4, 0.0)), (3, ROD, (4e-4, 0.0))])
+    moving = quiet.position + 5e-5 * rng.standard_normal((FRAMES, N, 2))
+    moving[2:4] = quiet.position[2:4]
+    tracks = replace(quiet, position=moving, radius=np.full(N, 0.00795))
+    assert np.argwhere(find_outliers(tracks)).tolist() == [[2, ROD], [3, ROD]]
+
+
+def test_a_rod_beyond_a_circular_wall_is_an_outlier():
+    low, large = SIDE // 2, 10.0
+    tracks = sheared_tracks([(2, low, (0.0, -4e-4))])
+    circle = circle_ends(np.array([[low * PITCH, large - 0.00798]]), np.array([large]), np.zeros(1))
+    walls = WallTracks(("ring",), np.tile(circle, (FRAMES, 1, 1, 1)), np.array([np.nan]), side=np.full(1, IN, np.int8))
+    assert np.argwhere(find_outliers(tracks, walls)).tolist() == [[2, low]]

@@ -47,5 +47,5 @@ def test_without_gaps_that_meet_variances_are_zero() -> None:
 
 
 def test_overlap_adds_a_quarter_of_its_square_to_the_variance_of_radii() -> None:
-    found = ErrorVariances(radius=4.0, centre=0.0, pair_weight=1.0)
+    found = ErrorVariances(radius=4.0, centre=0.0)
     assert found.radius_sd(overlap=3.0) == pytest.approx(np.sqrt(4.0 - 2.25))
