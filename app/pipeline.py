@@ -29,6 +29,7 @@ from .out_of_date import out_of_date
 from .process.atomic import write_atomically
 from .process.errors import InputError
 from .process.machine.free_memory import release_free_memory
+from .process.machine.linear_algebra import one_thread_each
 from .process.sources import hash_of_code
 from .process.stages import EFFECTS, FORCES, PHOTOGRAPHS_SHOWN, TRACKING
 from .results.checkpoint import Checkpoint
@@ -50,6 +51,7 @@ if TYPE_CHECKING:  # imported where they are used: the first photograph is read 
     from .robustness.study import Nominal
 
 
+@one_thread_each
 def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
     """Read and check all input without computing. Returns given tracks, and the walls."""
     experiment = run.experiment

@@ -18,6 +18,7 @@ from .inference.inference_settings import material_of, settings_of
 from .inference.inputs import Inputs
 from .inference.solve_frames import InferenceObserver
 from .process.errors import UndeterminedError
+from .process.machine.linear_algebra import one_thread_each
 from .process.progress import Progress, no_progress
 from .results.finding import Finding
 from .tracks import Tracks, WallTracks
@@ -93,6 +94,7 @@ class Prediction:
         return [self.verdict(), *([] if self.quality is None else self.quality.describe())]
 
 
+@one_thread_each
 def predict_accuracy(
     config: ExperimentFile, tracks: Tracks, walls: WallTracks | None, progress: Progress = no_progress
 ) -> Prediction:

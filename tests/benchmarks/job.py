@@ -55,9 +55,9 @@ def run_benchmark_job(folder: Path, out: Path) -> dict[str, object]:
     }
 
 
-def peak_memory() -> float:
-    """Peak memory of this process [MB]; on Linux from /proc, because getrusage includes the parent's."""
-    status = Path("/proc/self/status")
+def peak_memory(process: int | str = "self") -> float:
+    """Peak memory of a process [MB]; on Linux from /proc, because getrusage includes the parent's; else of this one."""
+    status = Path(f"/proc/{process}/status")
     for line in status.read_text(encoding="ascii").splitlines() if status.exists() else ():
         if line.startswith("VmHWM:"):
             return int(line.split()[1]) / 1024

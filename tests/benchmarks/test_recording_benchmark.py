@@ -36,18 +36,22 @@ from rodsight.recording.look.scene import Scene
 from rodsight.recording.packing_layers.forces.network import SweepChoice
 from rodsight.recording.tabs.blueprint import RecordingLayout, make_blueprint
 from rodsight.recording.tabs.layout_property import send_layout
-from rodsight.recording.viewing.headless import PICTURE_INTERVAL, HeadlessViewer, vulkan_drivers
+from rodsight.recording.viewing.headless import ANSWER_SECONDS, HeadlessViewer, vulkan_drivers
 from rodsight.solver.parallel import available_cores
 from rodsight.synthetic.synthesis import SynthesisSettings, synthesize
+
+from tests.benchmarks.job import peak_memory
+from tests.benchmarks.timing import time_fastest
 
 pytestmark = pytest.mark.slow
 
 FRAMES, SWEEPS = 60, 1000
 LARGEST = 160e6  # [bytes] with every visible sweep, without photographs
 SECONDS = 10.0  # of processor time for logging all of it
-# Limit of the time of a picture of another sweep, in single drawings of the same tab: the viewer draws it several times
-# (data are fetched on demand, then it draws the same twice), and the time of a drawing depends on machine and load.
-SEEK_DRAWINGS = 10.0
+# Limits of the time until the picture of another sweep is complete: drawings, as the viewer may draw before it has all
+# data, and seconds on an idle machine. The time of a drawing depends on machine and load.
+SEEK_DRAWINGS, SEEK_SECONDS = 2, 0.35
+EQUAL_PICTURES = 4  # in a row that show that nothing changes any more
 SEEK_TABS = ("Forces", "Convergence", "Contacts")
 MAX_SLOWDOWN = 1.15  # factor on the solving stage by a live view
 FREE_CORES = 0.5  # needed beside the load: other processes would use the core that draws
@@ -84,11 +88,17 @@ def test_a_recording_of_every_sweep_is_small_enough_to_send(experiment: Path, tm
         print(f", first complete picture after {time.perf_counter() - begin:.1f} s (9 s of them for notices to go)")
         for tab in SEEK_TABS:
             viewer.show_tab(tab)
-            seek = seconds_of(viewer, (last // 3, 17, last - 5, last // 2, last // 5))
-            step = seconds_of(viewer, (last // 5 + k for k in range(1, 6)))
-            drawing = seconds_of(viewer, (None, None, None))
-            print(f"{tab}: seek {seek:.2f} s, next sweep {step:.2f} s, one drawing {drawing:.2f} s (medians)")
-            assert seek <= SEEK_DRAWINGS * drawing + PICTURE_INTERVAL
+            viewer.picture()
+            drawing = time_fastest(viewer.draw).clock
+            seek, pictures = seek_time(viewer, (last // 3, 17, last - 5, last // 2, last // 5))
+            step, _ = seek_time(viewer, (last // 5 + 100 * k for k in range(1, 6)))
+            print(
+                f"{tab}: seek {seek:.2f} s or {pictures:g} drawings, next sweeps {step:.2f} s, one drawing "
+                f"{drawing:.2f} s (medians); peak memory of the viewer {peak_memory(viewer.process_id or 0):.0f} MB"
+            )
+            assert pictures <= SEEK_DRAWINGS
+            if os.getloadavg()[0] <= available_cores() - FREE_CORES:
+                assert seek <= SEEK_SECONDS
 
 
 @pytest.mark.parametrize(("preset", "frames"), [("small", 24), ("paper", 4)])
@@ -124,18 +134,20 @@ def solving_seconds(folder: Path, out: Path, settings: tuple[str, ...], view: st
     return run.timings.seconds["solving"], processor
 
 
-def seconds_of(viewer: HeadlessViewer, sweeps: Iterable[int | None]) -> float:
-    """Median seconds until the visible tab shows another sweep completely; None: of a single drawing."""
-    took = []
+def seek_time(viewer: HeadlessViewer, sweeps: Iterable[int]) -> tuple[float, float]:
+    """Median seconds and drawings until the picture of another sweep is complete, the first of the equal ones."""
+    took, drawings = [], []
     for sweep in sweeps:
-        begin = time.perf_counter()
-        if sweep is None:
-            viewer.draw()
-        else:
-            viewer.set_time("sweep", sweep)
-            viewer.picture()
-        took.append(time.perf_counter() - begin)
-    return float(np.median(took))
+        before, begin = viewer.draw(), time.perf_counter()
+        viewer.set_time("sweep", sweep)
+        pictures, at = [viewer.draw()], [time.perf_counter() - begin]
+        while len(pictures) < EQUAL_PICTURES or len(set(pictures[-EQUAL_PICTURES:])) > 1 or pictures[-1] == before:
+            assert at[-1] < ANSWER_SECONDS, f"sweep {sweep}: the picture does not change, or does not stop changing"
+            pictures.append(viewer.draw())
+            at.append(time.perf_counter() - begin)
+        drawings.append(1 + pictures.index(pictures[-1]))
+        took.append(at[drawings[-1] - 1])
+    return float(np.median(took)), float(np.median(drawings))
 
 
 def record_as_solved(folder: Path, path: Path, choice: SweepChoice) -> tuple[float, float, int]:

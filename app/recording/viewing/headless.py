@@ -98,6 +98,11 @@ class HeadlessViewer:
             self._process = None
 
     @property
+    def process_id(self) -> int | None:
+        """Number of the viewer's process; None while it does not run."""
+        return None if self._process is None else self._process.pid
+
+    @property
     def tabs(self) -> list[str]:
         """Names of the tabs, in their order."""
         return [self._name(each) for each in contents_of(self._root()[1])]
@@ -138,9 +143,9 @@ class HeadlessViewer:
         """Move the cursor of a timeline and stop there."""
         self._running().set_time(timeline, sequence=value, play_state="paused")
 
-    def draw(self) -> None:
-        """Draw the window once."""
-        self._running().take_screenshot()
+    def draw(self) -> bytes:
+        """Draw the window once, complete or not, and return the picture as PNG."""
+        return self._running().take_screenshot()
 
     def picture(self, view: str | None = None) -> bytes:
         """Take a picture once two consecutive ones are equal.

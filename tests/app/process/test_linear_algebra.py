@@ -21,12 +21,14 @@ def test_a_decorated_function_has_one_thread_and_leaves_as_many_as_before() -> N
         assert _threads() == before != {1}
 
 
-def test_forces_are_inferred_with_one_thread() -> None:
+def test_input_is_checked_and_forces_are_inferred_with_one_thread() -> None:
     from rodsight.inference.diagnosis.diagnose import diagnose, diagnose_solved
     from rodsight.inference.diagnosis.trial import solve_trial
     from rodsight.inference.infer_sequence import infer_sequence
+    from rodsight.pipeline import check
+    from rodsight.prediction import predict_accuracy
 
-    for function in (infer_sequence, solve_trial, diagnose, diagnose_solved):
+    for function in (infer_sequence, solve_trial, diagnose, diagnose_solved, check, predict_accuracy):
         assert hasattr(function, "__wrapped__")
 
 
