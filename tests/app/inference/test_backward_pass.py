@@ -7,9 +7,16 @@ from dataclasses import replace
 import numba
 import numpy as np
 import pytest
-from rodsight.inference.backward_pass import fuse_second_frame
+from rodsight.inference.backward_pass import (
+    ALIKE,
+    DRIFT,
+    INDEPENDENT,
+    MIN_SD,
+    UNLISTED_SD,
+    fuse_second_frame,
+)
 from rodsight.inference.first_frame import estimate_first_frame
-from rodsight.solver.contacts.pairs import match_values
+from rodsight.solver.contacts.pairs import align, match_values
 from rodsight.solver.frame_forces import FrameForces, FrameStatus
 from rodsight.solver.posterior.frame_posterior import FramePosterior
 
@@ -57,6 +64,24 @@ def test_fused_forces_stay_in_the_coulomb_cone_with_smaller_standard_deviations(
     assert (np.abs(fused.ft) <= friction * fused.fn * (1 + 1e-6) + 1e-9)[cone].all()
     stated = np.maximum(first.fn_sd, 0.02 * first.fn.mean())
     assert (fused.fn_sd <= stated * fused.fn.sum() / first.fn.sum() * 1.05 + 1e-12).all()
+
+
+def test_each_force_counts_by_its_information_and_the_drift_between_the_frames(sheared, pair):
+    first, second = pair
+    fused = fuse_second_frame(sheared.sequence, first, second)
+    assert fused is not None
+    _, one, two = align(first.contacts.key, first.fn, second.contacts.key, second.fn)
+    scale, mean = one.sum() / two.sum(), first.fn.mean()
+    alike = min(max((np.corrcoef(one, two)[0, 1] - ALIKE[0]) / (ALIKE[1] - ALIKE[0]), 0.0), 1.0)
+    drift = DRIFT * np.mean((one - scale * two) ** 2)
+    values, sd = (
+        scale * match_values(first.contacts.key, second.contacts.key, each, fill=fill)
+        for each, fill in ((second.fn, 0.0), (second.fn_sd, UNLISTED_SD * mean / scale))
+    )
+    own = INDEPENDENT * alike * np.maximum(first.fn_sd, MIN_SD * mean) ** 2
+    weight = own / (own + sd**2 + drift)
+    expected = (1.0 - weight) * first.fn + weight * values
+    np.testing.assert_allclose(fused.fn / fused.fn.sum(), expected / expected.sum(), rtol=1e-9)
 
 
 def test_the_scale_follows_the_second_frame_and_the_loads(sheared, pair):

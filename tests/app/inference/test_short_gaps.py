@@ -32,6 +32,8 @@ def test_a_short_gap_is_interpolated_and_remains_marked_as_lost(frames):
     found, remark = interpolate_short_gaps(tracks)
     rows = list(frames)
     assert np.abs(found.position[rows, ROD] - sheared_tracks().position[rows, ROD]).max() < 6 * NOISE
+    inside = [k for k in rows if 0 < k < FRAMES - 1]
+    np.testing.assert_allclose(found.rotation[inside, ROD], tracks.rotation[inside, ROD], atol=1e-12)
     assert np.all(found.status[rows, ROD] == TrackStatus.INTERPOLATED)
     assert np.array_equal(found.lost, tracks.lost)
     assert f"{len(frames)} lost poses" in remark

@@ -62,7 +62,7 @@ SMALLER = {
     "--preset paper --seed 1": ("--preset paper --seed 1 --grains 20", "1172 rods take minutes"),
     "--no-photographs --frames 200": ("--no-photographs --grains 40 --frames 20", "1172 rods take minutes"),
     "--grains 300 --frames 60": ("--grains 40 --frames 6", "300 rods take half a minute"),
-    "--preset fringes --grains 200": ("--preset fringes --grains 40", "a picture of each disc is computed"),
+    "--preset fringes": ("--preset fringes --grains 40", "the fringes of each disc are computed"),
     "--preset shear --no-photographs": ("--preset shear --no-photographs --grains 60", "450 rods take a minute"),
     "--grains 150": ("--grains 60", "simulated anew"),
     "--ensemble 8": ("--ensemble 2", "each is solved again"),
