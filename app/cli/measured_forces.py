@@ -1,15 +1,18 @@
-"""The subject real of the command study: measured forces of photoelastic discs, solved anew and compared."""
+"""The subjects real and fringes of the command study: forces of photoelastic discs, solved anew and compared."""
 
 from __future__ import annotations
 
 import json
 import shutil
 import time
+from collections.abc import Sequence
 from pathlib import Path
+from typing import get_args
 
 from ..process.atomic import write_atomically
 from ..process.errors import InputError
 from ..process.frame_range import ALL_FRAMES
+from ..synthetic.scenarios.preset_names import FringedPreset
 from .stored_results import load_run
 from .terminal import print_line, progress_of, table_console
 
@@ -38,6 +41,31 @@ def study_measured(folder: Path | None, page: Path | None, frame: int | None, *,
     real_page.print_real(table_console(real_page.WIDTH), found)
     if page is not None:
         print_line(table_console(), f"Pictures of frame {found.shown}: {page}")
+    return 0
+
+
+def study_fringes(seeds: Sequence[int], grains: int, out: Path, *, quiet: bool) -> int:
+    """Compare the forces of simulated photoelastic discs with and without their fringes, and print them. Returns 0."""
+    from .. import pipeline
+    from ..experiment.experiment import load_experiment
+    from ..run_folder import Run, hold_run
+    from ..study.real.fringe_gain import FringeGain, measure_gain, print_gains
+    from ..synthetic.photoelastic.fringe_photographs import make_fringed
+
+    found: dict[str, list[FringeGain]] = {}
+    for preset in get_args(FringedPreset):
+        for seed in seeds:
+            folder = out / "fringes" / f"{preset}_{grains}_{seed}"
+            if not (folder / "experiment.toml").is_file():
+                with progress_of(quiet) as progress:
+                    make_fringed(folder, seed, preset=preset, grains=grains, progress=progress)
+            with progress_of(quiet) as progress:
+                run = Run(load_experiment(folder), folder.with_name(f"{folder.name}_run"), ALL_FRAMES, progress)
+                with hold_run(run):
+                    inputs, results, truth = pipeline.solved_inputs(run)
+            assert truth is not None
+            found.setdefault(preset, []).append(measure_gain(seed, inputs, results, truth))
+    print_gains(table_console(), found)
     return 0
 
 

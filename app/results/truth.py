@@ -87,6 +87,9 @@ def read_truth(
     # A pair may be listed in either order: f_n and f_t are the same in both.
     low, high = pair.min(axis=1), pair.max(axis=1)
     known = low >= 0
+    own = np.flatnonzero(known & (low == high))
+    if len(own):
+        raise table.error(int(own[0]), "j", "is the grain itself")
     check_unique(table, "j", number, np.where(known, low, i), np.where(known, high, -1 - np.arange(len(table))))
     fn, ft = table.numbers("fn"), table.numbers("ft")
     keep = np.flatnonzero(known & (frame >= 0) & (frame < frame_count))

@@ -31,7 +31,7 @@ from ..solver.bodies.wall_shapes import OUT, STRAIGHT, wall_distance
 from ..tracks import Tracks, WallTracks
 from . import DETECTIONS, PICTURES
 from .corner_discs import CORNERS, follow_corners
-from .detection.channels import count_discs, is_coloured
+from .detection.channels import count_clear, count_discs, is_coloured
 from .detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
 from .detection.false_detections import describe_channels, describe_false_detections
 from .follow import Execution, FollowedWalls, ReferenceGrains, Series, follow_photographs, follow_walls
@@ -228,7 +228,10 @@ def _detect(
         detection = add_missing_discs(first, detection)
     centres = np.stack([detection.x, detection.y], axis=1)
     within = _inside_walls(scale.to_world(centres), walls) if walls is not None else None
-    messages = [*_channel_messages(experiment, settings), *describe_false_detections(detection, within, first.shape)]
+    messages = [
+        *_channel_messages(experiment, settings, detection),
+        *describe_false_detections(detection, within, first.shape),
+    ]
     for message in messages:
         notify(message)
     if within is not None:
@@ -246,14 +249,14 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _channel_messages(experiment: Experiment, settings: DetectionSettings) -> list[str]:
+def _channel_messages(experiment: Experiment, settings: DetectionSettings, detection: Detection) -> list[str]:
     """Message if more discs of a colour photograph are detected in another channel."""
     section = experiment.config.photographs
     assert section is not None
     channels = experiment.photographs().in_channels(0)
     if not is_coloured(channels):
         return []
-    return describe_channels(count_discs(channels, settings), section.channel)
+    return describe_channels(count_discs(channels, settings), section.channel, count_clear(detection))
 
 
 def _inside_walls(position: Array, walls: WallTracks) -> NDArray[np.bool_]:

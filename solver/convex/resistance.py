@@ -74,7 +74,7 @@ def find_resistance(frames: Sequence[ResistedFrame], given: SlidingModel, worker
         return None
     nothing = Resistance("", given, before, given, before)
     turned = power_gap([each.reversed() for each in frames], given)
-    if turned < min(REVERSED * before, MOST_GAP):
+    if turned < min(REVERSED * before, before - LEAST_GAP, MOST_GAP):
         return Resistance("photographs_reversed", given, before, given, turned)
     walls = float(np.mean([each.contacts.with_wall.sum() for each in frames]))
     names = [name for name in RIVALS if name != "wall_friction" or walls >= LEAST_WALLS]

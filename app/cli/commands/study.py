@@ -49,6 +49,7 @@ def study(
             "report",
             "budget",
             "real",
+            "fringes",
             "perturbation",
         ],
         tyro.conf.Positional,
@@ -58,7 +59,8 @@ def study(
             "the two estimates; every statistic against the truth; coverage of the intervals of forces by "
             "groups of contacts, and a fit of their constants; all of that as one page, with what is outside "
             "its limits; the accuracy that `check` predicts from the first photographs beside the result; a run "
-            "against measured forces; the change of forces by small changes of input"
+            "against measured forces; simulated photoelastic discs with and without "
+            "fringes; the change of forces by small changes of input"
         ),
     ],
     folder: Annotated[
@@ -130,6 +132,10 @@ def study(
         from ..measured_forces import study_measured
 
         return study_measured(folder, page, frame, as_json=as_json)
+    if subject == "fringes":
+        from ..measured_forces import study_fringes
+
+        return study_fringes(seeds, 200 if grains is None else grains, out, quiet=quiet)
     from ...study.scenarios.scenario_score import StudyPlan
     from ...synthetic.scenarios.scenario_folder import GRAINS
 

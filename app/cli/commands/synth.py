@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 import tyro
 from rich.console import Console
@@ -27,7 +27,8 @@ def synth(
         tyro.conf.arg(
             help="small, paper and 1g2e can be photographed; 1g2e: the apparatus of the method's authors, with corner "
             "discs, a measured load and .0267° of shear a photograph; photoelastic: discs and their forces as PeGS "
-            "writes them, for rodsight import pegs; fringes: photographs of such discs with their fringes; the others "
+            "writes them, for rodsight import pegs; fringes: photographs of such discs with their fringes; "
+            "stiff_fringes: of discs whose overlaps noise hides; the others "
             "are scenarios of tracks: --no-photographs"
         ),
     ] = "small",
@@ -88,8 +89,8 @@ def synth(
             )
         else:
             refused = {
-                "--photographs": photographs and preset not in ("photoelastic", "fringes"),
-                "--frames": None if preset == "fringes" else frame_count,
+                "--photographs": photographs and preset not in ("photoelastic", *get_args(FringedPreset)),
+                "--frames": None if preset in get_args(FringedPreset) else frame_count,
                 "--step-degrees": step_degrees, "--pixel-size": pixel_size, "--jpeg-quality": jpeg_quality,
                 "--png": png, "--reversal": reversal, "--radius-error": radius_error,
             }  # fmt: skip
@@ -98,10 +99,10 @@ def synth(
                     raise InputError("synth", f"{option} with preset {preset}", "applies to photographed presets only")
             if preset == "photoelastic":
                 return _photoelastic(out, seed, grains, progress, quiet=quiet)
-            if preset == "fringes":
+            if preset in ("fringes", "stiff_fringes"):
                 from ...synthetic.photoelastic.fringe_photographs import make_fringed
 
-                made = make_fringed(out, seed, grains=grains, frames=frame_count, progress=progress)
+                made = make_fringed(out, seed, preset=preset, grains=grains, frames=frame_count, progress=progress)
             else:
                 made = make_scenario(out, preset, seed, grains=grains, noise=noise, progress=progress)
     if not quiet:

@@ -174,9 +174,8 @@ def _read_by_photograph(files: list[Path]) -> tuple[Observations, ForceReadings]
             disc, other, fn, ft = found
             parts_of_readings.append(ForceReadings(np.full(len(fn), frame, np.int64), ids[disc], ids[other], fn, ft))
     remarks = [] if parts_of_readings else [f"There are no forces: neither *{NORMAL} nor *{BONDS}."]
-    readings, remark = without_copies(_join_readings(parts_of_readings))
+    readings = _keep_between_two(_join_readings(parts_of_readings), remarks)
     table = np.concatenate(parts)
-    remarks += [remark] if remark else []
     return _observe(files[0].parent, np.concatenate(frames), table, lines, tuple(remarks)), readings
 
 
@@ -190,16 +189,26 @@ def _read_all(folder: Path) -> tuple[Observations, ForceReadings]:
             raise InputError(file, "", f"does not name its frame of {len(number)}: six columns are expected")
         table = np.column_stack([np.full(len(table), number[0] if len(number) else 1.0), table])
     frame = _whole_numbers(file, table[:, 0], "frame")
-    remarks = []
+    remarks: list[str] = []
     contacts[contacts[:, 2] < 0, 2] = WALL
     known = np.isin(contacts[:, 1], table[:, 1]) & np.isin(contacts[:, 2], [WALL, *table[:, 1]])
     if not known.all():
         remarks.append(f"{int((~known).sum())} forces of discs without a position are left out.")
     whole = _whole_numbers(folder / CONTACTS, contacts[known, :3].ravel(), "frame, i or j").reshape(-1, 3)
     side = ForceReadings(whole[:, 0], whole[:, 1], whole[:, 2], contacts[known, 4], contacts[known, 3])
-    side, remark = without_copies(side)
-    remarks += [remark] if remark else []
+    side = _keep_between_two(side, remarks)
     return _observe(file, frame, table[:, 1:5], list(range(1, len(table) + 1)), tuple(remarks)), side
+
+
+def _keep_between_two(readings: ForceReadings, remarks: list[str]) -> ForceReadings:
+    """Leave out forces of a disc on itself and copies of readings; what is left out is added to the remarks."""
+    own = readings.disc == readings.other
+    if own.any():
+        remarks.append(f"{int(own.sum())} forces of discs on themselves are left out.")
+        readings = ForceReadings(*(getattr(readings, each.name)[~own] for each in fields(ForceReadings)))
+    readings, remark = without_copies(readings)
+    remarks += [remark] if remark else []
+    return readings
 
 
 def _observe(

@@ -23,8 +23,9 @@ from ...solver.bodies.grains import Array
 from ...solver.bodies.wall_shapes import wall_distance
 from ...solver.dem.dem_truth import DemTruth
 from .. import experiment_files
+from ..scenarios.preset_names import FringedPreset
 from ..scenarios.scenario_folder import check_output, load_or_simulate
-from ..scenarios.scenario_table import FRINGED
+from ..scenarios.scenario_table import FRINGED_LOADINGS
 from .stress_optics import fringe_light, stress_difference
 
 DIAMETER = 60.0  # px, mean
@@ -52,6 +53,7 @@ def make_fringed(
     out: Path,
     seed: int = 0,
     *,
+    preset: FringedPreset = "fringes",
     grains: int | None = None,
     frames: int | None = None,
     cache: Path | None = None,
@@ -64,6 +66,8 @@ def make_fringed(
     out : Path
         Folder to write; must be absent or empty.
     seed : int
+    preset : {'fringes', 'stiff_fringes'}
+        Discs that overlap by their tracks' errors, or by a tenth of them.
     grains : int, optional
     frames : int, optional
         Photographs; default: all of the simulation.
@@ -79,7 +83,7 @@ def make_fringed(
         If the simulation does not come to rest.
     """
     grains = check_output(out, grains)
-    truth = load_or_simulate(FRINGED, grains, seed, cache, progress)
+    truth = load_or_simulate(FRINGED_LOADINGS[preset], grains, seed, cache, progress)
     if frames is not None:
         truth = truth.frames(0, min(frames, truth.frame_count))
     pixel = 2.0 * float(truth.radius.mean()) / DIAMETER

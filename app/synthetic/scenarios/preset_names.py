@@ -6,7 +6,7 @@ from typing import Literal
 
 PhotographedPreset = Literal["small", "paper", "1g2e"]
 MeasuredPreset = Literal["photoelastic"]  # no experiment, but the output of another program
-FringedPreset = Literal["fringes"]  # photographs of photoelastic discs
+FringedPreset = Literal["fringes", "stiff_fringes"]  # photographs of photoelastic discs
 Group = Literal["correct", "missing physics", "wrong input"]
 ScenarioName = Literal[
     "shear", "sheared", "biaxial", "isotropic", "gravity", "soft", "softer", "soft_radii_03", "soft_radii_1",

@@ -63,7 +63,7 @@ from .loading_paths import (
     tilt_heap,
     turn_core,
 )
-from .preset_names import Group, ScenarioName
+from .preset_names import FringedPreset, Group, ScenarioName
 
 DISC_NOISE = 1.18e-4  # [m], 0.7 % of a mean diameter of the two sizes
 
@@ -93,6 +93,10 @@ HEAP = DemSettings(pressure=float("nan"), gravity=(0.0, -9.81), normal_stiffness
 DISCS = DemSettings(normal_stiffness=4e5, friction=0.3, wall_friction=0.3, base_friction=10.0)
 # Stiff discs, whose overlaps are smaller than the errors of tracked rims, loaded without sliding.
 FRINGED = LoadingPath(load_isotropically, 0.0, settings=DemSettings(friction=0.3), sizes=choose_two_radii)
+FRINGED_LOADINGS: dict[FringedPreset, LoadingPath] = {
+    "fringes": FRINGED,
+    "stiff_fringes": replace(FRINGED, settings=DemSettings(friction=0.3, normal_stiffness=2e8)),  # as the stiff rods
+}
 
 
 MOVED = LoadingPath(shear, 0.25, initial_shear=2.0, plates=("top",))  # the first photograph is like the others

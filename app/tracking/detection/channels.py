@@ -107,4 +107,9 @@ def count_discs(channels: Mapping[str, Image], settings: DetectionSettings) -> d
         return {}
     small = _on_copy(settings, factor)
     found = {name: detect_grains(shrink(image, factor), small) for name, image in channels.items()}
-    return {name: int((each.quality > MIN_QUALITY).sum()) for name, each in found.items()}
+    return {name: count_clear(each) for name, each in found.items()}
+
+
+def count_clear(detection: Detection) -> int:
+    """Count the discs whose outline is visible for the most part."""
+    return int((detection.quality > MIN_QUALITY).sum())

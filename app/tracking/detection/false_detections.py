@@ -80,12 +80,22 @@ def describe_false_detections(
     return [_region_advice(fact, _region_about(detection, ~separate, shape))]
 
 
-def describe_channels(count: dict[str, int], used: str) -> list[str]:
-    """Describe a channel with more discs than the one that is used; count: number of discs by channel."""
+def describe_channels(count: dict[str, int], used: str, found: int = 0) -> list[str]:
+    """Describe a channel with more discs than the one that is used.
+
+    Parameters
+    ----------
+    count : dict of str to int
+        Discs in a small copy of each channel.
+    used : str
+        The channel that is used.
+    found : int
+        Discs that the whole picture of that channel shows.
+    """
     if not count:
         return []
     best = max(count, key=lambda name: count[name])
-    if count[best] < max(MIN_GAIN_RATIO * count[used], count[used] + MIN_GAIN):
+    if found >= count[best] or count[best] < max(MIN_GAIN_RATIO * count[used], count[used] + MIN_GAIN):
         return []
     return [
         f"{count[best]} discs are detected in the {best} channel and {count[used]} in {used}: set "

@@ -49,6 +49,9 @@ def test_contacts_of_unseen_rods_are_ignored_and_unknown_ids_refused(poses: Path
     names = np.array([10, 11, 12])
     found = read_truth(truth, names, ("top",), frame_count=1, unseen=true_ids(poses))
     assert found.fn.tolist() == [5.0]
+    truth.write_text("frame,i,j,fn,ft\n0,10,11,5,1\n0,12,12,7,2\n")
+    with pytest.raises(InputError, match=r"row 3, j = '12': is the grain itself"):
+        read_truth(truth, names, ("top",), frame_count=1)
     truth.write_text("frame,i,j,fn,ft\n0,10,99,5,1\n")
     with pytest.raises(InputError, match=r"row 2, j = '99': is not the id of a grain"):
         read_truth(truth, names, ("top",), frame_count=1, unseen=true_ids(poses))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+from rodsight.cli.main import main
 from rodsight.synthetic.photoelastic.fringe_photographs import make_fringed
 from rodsight.synthetic.photoelastic.stress_optics import fringe_light, stress_difference
 from rodsight.tracking.fringes import squared_gradients
@@ -64,3 +65,17 @@ def test_photographs_have_their_truth(tmp_path):
     again = make_fringed(tmp_path / "again", 1, grains=60, frames=2)
     for file in ("photos/0001.png", "truth_contacts.csv"):
         assert (made.folder / file).read_bytes() == (again.folder / file).read_bytes()
+
+
+@pytest.mark.slow
+def test_fringes_improve_the_forces_of_discs_whose_overlaps_noise_hides(tmp_path, capsys):
+    assert main(["study", "fringes", "--seeds", "1", "--grains", "100", "--out", str(tmp_path), "--quiet"]) == 0
+    printed = capsys.readouterr().out
+    rows = {line.split("  ")[0]: [float(cell) for cell in line.split()[2:]] for line in printed.splitlines()[2:]}
+    assert {"fringes, 1", "stiff_fringes, 1", "fringes, mean", "stiff_fringes, mean"} == set(rows)
+    _, without, fringed, gain, pressures, margin = rows["stiff_fringes, 1"]
+    assert gain == pytest.approx(fringed - without, abs=2e-3)
+    assert gain > 0.05
+    assert pressures > 0.9
+    assert margin > -0.03  # the trust is a lower bound
+    assert rows["fringes, 1"][1] > without  # their overlaps say more

@@ -304,3 +304,16 @@ def test_a_motion_that_fits_in_reverse_order_is_named_first(frames, monkeypatch)
     found = find_resistance(frames[2], GIVEN)
     assert found is not None
     assert found.cause == "photographs_reversed"
+
+
+def test_a_gap_that_is_nothing_in_either_order_names_no_order(frames, monkeypatch):
+    gaps = iter([0.004, 0.001])
+    monkeypatch.setattr(resistance, "power_gap", lambda *_: next(gaps))
+    monkeypatch.setattr(
+        resistance,
+        "compare_models",
+        lambda frames, given, rivals, workers: [FittedModel(given, 0.004, True)] * len(rivals),
+    )
+    found = find_resistance(frames[2], GIVEN)
+    assert found is not None
+    assert found.cause == ""

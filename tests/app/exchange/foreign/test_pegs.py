@@ -69,12 +69,15 @@ def test_bonds_without_matrices_give_one_reading(tmp_path, capsys):
 def test_lists_of_all_photographs(tmp_path, capsys):
     positions = "".join(f"{frame},{row}\n" for frame in (3, 4) for row in DISCS.splitlines())
     (tmp_path / "particle_positions.txt").write_text(positions)
-    (tmp_path / "Adjacency_list.txt").write_text("3,1,2,.01,.5\n3,2,1,.01,.3\n3,1,-1,0,.9\n4,2,3,0,.2\n4,2,77,0,.2\n")
+    (tmp_path / "Adjacency_list.txt").write_text(
+        "3,1,2,.01,.5\n3,2,1,.01,.3\n3,1,-1,0,.9\n4,2,3,0,.2\n4,2,77,0,.2\n4,3,3,0,.8\n"
+    )
     printed = import_files(capsys, "pegs", tmp_path, tmp_path / "out")
     rows = truth_in(tmp_path / "out")
     assert [(row["frame"], row["i"], row["j"]) for row in rows] == [("0", "1", "2"), ("1", "2", "3")]
     assert float(rows[0]["fn"]) == pytest.approx(0.4)
     assert "1 forces on walls are left out" in printed
+    assert "1 forces of discs on themselves are left out" in printed
     assert "1 forces of discs without a position are left out" in printed
 
 

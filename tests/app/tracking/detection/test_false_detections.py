@@ -49,6 +49,7 @@ def test_the_channel_with_more_discs_is_named() -> None:
     assert message.startswith("27 discs are detected in the red channel and 10 in grey")
     assert describe_channels({"grey": 26, "red": 27, "green": 9, "blue": 3}, "grey") == []
     assert describe_channels({}, "grey") == []
+    assert describe_channels({"grey": 88, "red": 63, "green": 9, "blue": 3}, "red", found=200) == []
 
 
 def test_discs_are_counted_in_every_channel_of_a_coloured_photograph() -> None:
