@@ -40,10 +40,7 @@ from .outline.missing_discs import add_missing_discs
 from .registration.manual_poses import ManualPoses
 from .report.page import TrackingReportData
 from .settings import TrackingSettings
-from .walls.bar_depth import visible_depth
-
-# Greatest depth of a bar's body that is used, in mean radii of the grains.
-MAX_BAR_DEPTH = 3.0
+from .walls.bar_depth import MAX_BAR_DEPTH, visible_depth
 
 Columns = dict[str, NDArray[Any]]
 

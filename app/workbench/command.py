@@ -30,11 +30,11 @@ def initialise_experiment(folder: Path, flags: SetupFlags, *, quiet: bool) -> in
     found = initialise(folder, flags)
     console = Console(quiet=quiet)
     for step in found.steps.values():
-        console.print(f"{SIGNS[step.mark.value]} {step.name}: {_summary(found, step.name)}", highlight=False)
-        for sentence in step.messages:
-            console.print(f"    {sentence}", highlight=False, soft_wrap=True)
+        heading = f"{SIGNS[step.mark.value]} {step.name}: {_summary(found, step.name)}"
+        for text in (heading, *(f"    {sentence}" for sentence in step.messages)):  # with sections in brackets
+            console.print(text, highlight=False, soft_wrap=True, markup=False)
     console.print(f"Written: {folder / CONFIG_NAME}. Look at {folder / PICTURE}, then rodsight check {folder}.",
-                  highlight=False, soft_wrap=True)  # fmt: skip
+                  highlight=False, soft_wrap=True, markup=False)  # fmt: skip
     return 0
 
 

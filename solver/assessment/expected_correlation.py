@@ -39,6 +39,7 @@ MEASURES: dict[str, Callable[[Evidence], float]] = {
 }
 MOSTLY_OVERLAPS = 0.5  # weight of the position-only estimate of soft grains above which only its evidence counts
 CONTRADICTED: float = FITTED["expected_correlation"]["contradicted"]  # change of a prediction where a cause is named
+WIDEST: float = FITTED["expected_correlation"]["widest_gap_error"]  # gap error that simulated frames have reached
 BEST_EIGHTH = 1  # knot of a table: quantiles of the frames of the fit, an eighth apart
 LEAST = 1e-4  # of a measure: its logarithm is taken
 LEAST_SIGNAL = 1e-2  # of sliding over its noise, below which no sliding is seen
@@ -75,9 +76,10 @@ def bound_correlation(evidence: Evidence) -> float:
     -----
     T = tanh(g − max(a + b g, 0)) with g the argument of `expect_correlation`: a quantile of the errors of g, fitted on
     kinds of input left out (fitted.toml). A margin that depended on measures as well fitted better the kinds that it
-    had read, and worse the others.
+    had read, and worse the others. Where the gap error x exceeds the greatest one x_0 that was fitted, nothing is known
+    of r, and T is multiplied by x_0/x.
     """
-    return _bound(correlation_score(evidence), evidence)
+    return _bound(correlation_score(evidence), evidence) * _known_fraction(evidence)
 
 
 def predict_correlation(evidence: Sequence[Evidence], *, contradicted: bool = False) -> tuple[float, float, float]:
@@ -118,12 +120,22 @@ def rests_on_overlaps(evidence: Evidence) -> bool:
 
 def losses(evidence: Evidence) -> dict[str, float]:
     """By how much the bound would rise if one measure were as in the best eighth of the fit, for each known measure."""
-    table, score = _table(evidence), correlation_score(evidence)
+    table, score, known = _table(evidence), correlation_score(evidence), _known_fraction(evidence)
     best = {
         name: max(float(each["value"][BEST_EIGHTH]) - _term(each, MEASURES[name](evidence)), 0.0)
         for name, each in _terms(table)
     }
-    return {name: _bound(score + rise, evidence) - _bound(score, evidence) for name, rise in best.items()}
+    bound = known * _bound(score, evidence)
+    return {
+        name: (1.0 if name == "gap_error" else known) * _bound(score + rise, evidence) - bound
+        for name, rise in best.items()
+    }
+
+
+def _known_fraction(evidence: Evidence) -> float:
+    """Fraction of the bound that is left of a frame whose gaps are wider than those of any fitted one."""
+    gap_error = MEASURES["gap_error"](evidence)
+    return WIDEST / gap_error if gap_error > WIDEST else 1.0
 
 
 def _bound(score: float, evidence: Evidence) -> float:

@@ -48,7 +48,7 @@ def fill_unknown_rotations(
     present : bool array (f, n)
         Whether each rod is present.
     endpoints : array (f, w, 2, 2)
-        Ends of the walls [m].
+        Ends of the walls [m]; NaN where a wall is unknown: nothing then slides on it.
     side : array (w,), optional
         Which walls are circles.
     cell : array (f, 2, 2), optional
@@ -74,9 +74,11 @@ def fill_unknown_rotations(
         both = present[k] & present[k + 1]
         free = both & (unknown[k] | unknown[k + 1])
         angle = np.where(both & ~free, rotation[k + 1] - rotation[k], 0.0)
-        wall_shift = wall_displacement(endpoints[k], endpoints[k + 1], side, at=endpoints[k])
+        seen = np.isfinite(endpoints[k : k + 2]).all(axis=(0, 2, 3))  # walls that are known in both frames
+        ends, sides = endpoints[k : k + 2, seen], None if side is None else side[seen]
+        wall_shift = wall_displacement(ends[0], ends[1], sides, at=ends[0])
         box = None if cell is None else Cell(cell[k], cell[k + 1] - cell[k])
-        walls = Walls(endpoints[k], wall_shift, np.full(len(wall_shift), np.nan), side, box)
+        walls = Walls(ends[0], wall_shift, np.full(len(wall_shift), np.nan), sides, box)
         angle = _minimise_sliding(grains, (position[k], position[k + 1]), angle, both, free, walls)
         carried = np.where(present[k], np.nan_to_num(filled[k]), 0.0) + angle
         filled[k + 1] = np.where(unknown[k + 1], carried, filled[k + 1])

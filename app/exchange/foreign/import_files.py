@@ -15,7 +15,7 @@ from .file_formats import ImportedData, read_format
 from .format_names import FileFormat
 from .imported_corners import make_corners
 from .observations import Convention, ImportedTracks, Observations, make_tracks
-from .pegs import ForceReadings, true_contacts, true_wall_forces
+from .pegs import ForceReadings, true_contacts, true_wall_forces, without_distant
 from .proposed_walls import propose_box, read_foreign_walls
 from .simulations.pair_forces import contacts_of_pairs, read_pair_forces
 
@@ -123,9 +123,9 @@ def _with_measured_forces(
     readings: ForceReadings, contents: FolderContents, imported: ImportedTracks
 ) -> tuple[FolderContents, ImportedTracks]:
     """Add measured forces between discs and on walls to the folder, and a remark on what was left out."""
+    readings, distant = without_distant(readings, imported)
     between = true_contacts(readings, imported)
     at_walls, remark = true_wall_forces(readings, imported, contents.walls)
-    if remark:
-        imported = replace(imported, remarks=(*imported.remarks, remark))
+    imported = replace(imported, remarks=(*imported.remarks, *filter(None, (distant, remark))))
     truth = {name: [*values, *at_walls[name]] for name, values in between.items()}
     return (replace(contents, truth=truth) if truth["frame"] else contents), imported

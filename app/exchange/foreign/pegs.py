@@ -28,6 +28,8 @@ from .observations import ImportedTracks, Observations
 from .proposed_walls import Walls
 
 DISCS, BONDS = "_ParticleData.dlm", "_bonds.txt"
+DISTANT = 1.5  # sums of radii between centres, above which discs cannot touch
+MOSTLY = 0.5  # of the forces of a frame, above which its ids are wrong
 COPY_DIGITS = 1e-6  # relative difference of copies: that of their rounding
 LEAST_COPIES = 4  # rows
 WALL = -1  # instead of the other disc
@@ -125,6 +127,28 @@ def true_contacts(readings: ForceReadings, imported: ImportedTracks) -> dict[str
         for name, value in zip(columns, values, strict=True):
             columns[name].append(value)
     return columns
+
+
+def without_distant(readings: ForceReadings, imported: ImportedTracks) -> tuple[ForceReadings, str]:
+    """Leave out forces between discs that cannot touch, whose ids are wrong; also return a remark, or ""."""
+    tracks = imported.tracks
+    frame_of = {int(number): k for k, number in enumerate(imported.number)}
+    row_of = {int(name): k for k, name in enumerate(tracks.id)}
+    frame, i, j = (
+        np.array([rows.get(int(value), -1) for value in values], np.int64)
+        for rows, values in ((frame_of, readings.frame), (row_of, readings.disc), (row_of, readings.other))
+    )
+    known = (frame >= 0) & (i >= 0) & (j >= 0) & (readings.other != WALL)
+    apart = np.linalg.norm(tracks.position[frame, i] - tracks.position[frame, j], axis=1)
+    distant = known & (apart > DISTANT * (tracks.radius[i] + tracks.radius[j]))
+    if not distant.any():
+        return readings, ""
+    count, of = np.bincount(frame[distant]), np.bincount(frame[known])
+    wrong = np.flatnonzero(count > MOSTLY * of[: len(count)])
+    mostly = f" Most of them are in frames {', '.join(map(str, wrong))}: ids of positions and forces differ there." if (
+        len(wrong)) else ""  # fmt: skip
+    kept = ForceReadings(*(getattr(readings, each.name)[~distant] for each in fields(ForceReadings)))
+    return kept, f"{int(distant.sum())} forces between discs that lie apart are left out.{mostly}"
 
 
 def true_wall_forces(

@@ -60,6 +60,11 @@ MAX_BRIGHT_LEFT = 0.01
 SCAN_STEP = 1.06
 
 
+# Fractions of an outline that are seen: of a circle that is certain, and of one that may be accidental, of which noise
+# shows a third.
+CLEAR, FAINT, FEWEST_CLEAR = 0.55, 0.35, 20
+
+
 @dataclass(frozen=True, slots=True)
 class DetectionSettings:
     """Known properties of the grains, and thresholds. Lengths in pixels."""
@@ -127,8 +132,21 @@ def detect_grains(image: Image, settings: DetectionSettings | None = None) -> De
     good &= found.quality > CLOSE_FRACTION * settings.min_quality
     if not known:
         good &= (found.radius > 0.9 * smallest) & (found.radius < 1.1 * radii[-1])
+        good &= ~_accidental(found.radius, found.quality, good)
     order = order[good[order]]
     return Detection(found.x[order], found.y[order], found.radius[order], found.sigma[order], found.quality[order])
+
+
+def _accidental(radius: Array, quality: Array, good: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Mark circles (n,) of which as little is seen as of accidental ones, and whose size no clear circle has.
+
+    The paint of a bar has such circles. Where few circles are clear, nothing is marked.
+    """
+    clear = good & (quality > CLEAR)
+    if clear.sum() < FEWEST_CLEAR:
+        return np.zeros(len(radius), np.bool_)
+    same_size = (radius > 0.9 * radius[clear].min()) & (radius < 1.1 * radius[clear].max())
+    return (quality < FAINT) & ~same_size
 
 
 def refine_grains(image: Image, x: Array, y: Array, radius: Array, *, fixed_radius: bool = True) -> Detection:

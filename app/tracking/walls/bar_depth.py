@@ -8,6 +8,9 @@ from ...experiment.pictures.image import Image
 from ...experiment.units import Scale
 from ...solver.bodies.grains import Array
 
+# Greatest depth of a bar's body that is used, in mean radii of the grains.
+MAX_BAR_DEPTH = 3.0
+
 
 def visible_depth(image: Image, endpoints: Array, scale: Scale, most: float) -> Array:
     """Measure the visible depth of each bar's body beside its inner face.

@@ -117,6 +117,14 @@ def find_bars(x: Array, y: Array, radius: Array, count: int = 4) -> Array:
     return np.array(lines).reshape(-1, 2, 2) * [1.0, -1.0]
 
 
+def depth_in_circles(line: Array, x: Array, y: Array, radius: Array) -> float:
+    """Return how far a line (2, 2) reaches into one of n circles at most, over its radius; negative: into none."""
+    along = line[1] - line[0]
+    across = np.array([-along[1], along[0]]) / np.hypot(*along)
+    distance = np.abs((np.column_stack([x, y]) - line[0]) @ across)
+    return float(np.max(1.0 - distance / radius))
+
+
 def lines_to_corners(lines: Array) -> Array:
     """Extend or cut lines (w, 2, 2) to the corners where each meets the next."""
     moved = np.array(lines, dtype=np.float64)

@@ -21,7 +21,7 @@ from ...process.errors import InputError
 from ...solver.bodies.grains import Array
 from ...solver.bodies.wall_shapes import STRAIGHT
 from ...tracking.detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
-from ...tracking.walls.inner_edge import find_bars, lines_to_corners, snap_to_edge
+from ...tracking.walls.inner_edge import depth_in_circles, find_bars, lines_to_corners, snap_to_edge
 from .circles import arcs_table, circles_of, moved_corners, renamed
 from .draft import Draft, as_table
 from .validation import ValidationResult, validate
@@ -40,6 +40,7 @@ FEW = 4  # rods: fewer are no packing
 FACTORS = (10.0, 0.1, 2.0, 0.5, 1000.0, 0.001)  # by which a scale or its unit is mistaken
 CLEAR = 0.5  # fraction of an outline that is seen
 LEAST_RADIUS = 3.0  # [px] of a rod
+TOUCHES = 0.08  # radii between the edge of a bar and the rod next to it; else it is another edge
 SEEN = 0.34  # fraction of the profiles across a line that must show the edge
 NAMES = ("bottom", "right", "top", "left")
 # Densities [kg/m³] and textbook friction coefficients of dry, clean rods: initial values.
@@ -178,10 +179,11 @@ def find_walls(image: Image, found: ValidationResult) -> Array:
         )
     lines = find_bars(rods.x, rods.y, rods.radius)
     snapped = [snap_to_edge(image, line, 0.6 * float(np.median(rods.radius))) for line in lines]
-    lines = np.array(
-        [moved if fraction >= SEEN else line for line, (moved, fraction) in zip(lines, snapped, strict=True)]
-    )
-    return lines_to_corners(lines)
+    chosen = [
+        moved if fraction >= SEEN and abs(depth_in_circles(moved, rods.x, rods.y, rods.radius)) < TOUCHES else line
+        for line, (moved, fraction) in zip(lines, snapped, strict=True)
+    ]
+    return lines_to_corners(np.array(chosen))
 
 
 def names_of(lines: Array) -> tuple[str, ...]:

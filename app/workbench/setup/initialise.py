@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ...exchange.foreign.file_formats import DEFAULT_PIXEL_SIZE
 from ...exchange.photographic.opencv_calibration import read_calibration
 from ...exchange.photographic.rod_readings import read_rods
 from ...exchange.photographic.video_frames import duration, extract_frames, is_video
@@ -22,12 +23,14 @@ from ...experiment.plausibility import rods_cut_by_walls
 from ...process.atomic import write_atomically
 from ...process.errors import InputError
 from ...process.frame_range import ALL_FRAMES, FrameRange
+from ...solver.bodies.wall_shapes import STRAIGHT
 from ...tracking.detection.channels import View, compare_views
 from ...tracking.detection.detect import Detection, DetectionSettings, refine_grains
 from ...tracking.outline.missing_discs import add_missing_discs
 from ...tracking.outline.outline_tracker import OutlineTracker
 from ...tracking.settings import TrackingSettings
 from ...tracking.tracker import Tracker
+from ...tracking.walls.plain_bars import can_be_followed
 from ...tracks import TrackStatus
 from . import circles, edits
 from .draft import Draft
@@ -39,6 +42,7 @@ PICTURE = "understood.png"
 SURE = (TrackStatus.OK, TrackStatus.RESCUED, TrackStatus.ROBUST)
 MOST_VIEWS, KEPT = 3, 0.8  # of a photograph that are tried; fraction of the discs of the small copy
 BETTER_FOLLOWED = 1.2  # ratio of rods that are followed by their outlines to those by their texture
+ASSUMED_INTERVAL = 1.0  # s
 FOUND, NONE = "auto", "none"
 
 
@@ -100,11 +104,13 @@ def _remove_empty(folder: Path) -> None:
 
 def _initialise(folder: Path, draft: Draft, flags: SetupFlags, video: list[str]) -> ValidationResult:
     photographs = Photographs.matching(folder, flags.photographs)
+    pixel_size = _pixel_size(flags)
     name = flags.name if flags.name is not None else valid_name(folder.resolve().name)
     with draft.one_step("new experiment"):
         edits.begin(draft, name, flags.photographs)
         keys = {
-            "photographs.interval": flags.interval, "photographs.pixel_size": flags.pixel_size,
+            "photographs.interval": ASSUMED_INTERVAL if flags.interval is None else flags.interval,
+            "photographs.pixel_size": pixel_size,
             "photographs.radii": list(flags.radii) or None, "photographs.channel": flags.channel,
             "photographs.region": list(flags.region) or None, "photographs.follow": flags.follow,
             "photographs.lens": None if flags.lens is None else read_calibration(flags.lens, photographs.shape),
@@ -122,11 +128,32 @@ def _initialise(folder: Path, draft: Draft, flags: SetupFlags, video: list[str])
         keys = {"photographs.channel": view.channel if view.channel != "grey" else None, "photographs.follow": follow}
         draft.set_keys("channel and following", {key: value for key, value in keys.items() if value is not None})
         found = _without_errors(draft, "photographs")
-        notes = [*video, *left_out, *remarks, *how, *notes]
+        plain = _replace_plain_bars(draft, flags, photographs, selection, found)
+        found = _without_errors(draft, "photographs")
+        notes = [*video, *left_out, *remarks, *how, *notes, *plain]
         write_atomically(folder / PICTURE, draw_setup(_first(photographs, selection), found))
     for note in notes:
         found.steps["walls"].add_warning(note)
+    if flags.interval is None:
+        found.steps["photographs"].add_warning(
+            f"The time between photographs is unknown: {ASSUMED_INTERVAL:g} s is assumed, on which velocities depend. "
+            "Give --interval, or set it by rodsight open."
+        )
+    if flags.pixel_size is None:
+        found.steps["scale"].add_warning(
+            f"The pixel size is unknown: {pixel_size:g} m is assumed, on which lengths and stresses depend. Give "
+            "--pixel-size, or measure it by rodsight open."
+        )
     return found
+
+
+def _pixel_size(flags: SetupFlags) -> float:
+    """Return the stated pixel size [m], or an assumed one where no flag is in metres or pascal."""
+    in_metres = {"--radii": flags.radii, "--pressure": flags.pressure, "--walls": flags.walls not in (FOUND, NONE)}
+    for option, given in in_metres.items():
+        if given and flags.pixel_size is None:
+            raise InputError("--pixel-size", "", f"is missing: {option} needs the scale of the photographs")
+    return DEFAULT_PIXEL_SIZE if flags.pixel_size is None else flags.pixel_size
 
 
 def _choose_views(
@@ -219,6 +246,32 @@ def _choose_follow(
     return "outline", [
         f"By their outlines {counts['outline']} of {len(rods.x)} rods are followed to the second photograph, by their "
         f'texture {counts["texture"]}: follow = "outline".'
+    ]
+
+
+def _replace_plain_bars(
+    draft: Draft, flags: SetupFlags, photographs: Photographs, selection: ImageSelection, found: ValidationResult
+) -> list[str]:
+    """Impose the motion of the outermost rods where found bars cannot be followed; return a sentence on it."""
+    walls, scale, rods = found.walls, found.scale, found.rods
+    if flags.walls != FOUND or len(photographs) < 2 or walls is None or scale is None or rods is None:
+        return []
+    if (walls.sides != STRAIGHT).any():  # bars follow the discs in their corners
+        return []
+    first, second = (selection.cut(read_photograph(file, channel=selection.channel)) for file in photographs.files[:2])
+    radius = float(rods.radius.mean()) * scale.mean_size
+    seen = can_be_followed((first, second), walls.endpoints[0], scale, radius)
+    if seen.all():
+        return []
+    names = ", ".join(repr(name) for name, here in zip(walls.name, seen, strict=True) if not here)
+    fact = f"Bars {names} show nothing by which they could be followed to the second photograph"
+    if flags.pressure:
+        return [f"{fact}: give the ends of all bars in every photograph in walls.csv, or [walls] track = false."]
+    edits.set_walls(draft, found, [], "bars that cannot be followed")
+    draft.set_keys("boundary", {"boundary.grains": "outer"})
+    return [
+        f'{fact}: the motion of the outermost rods is imposed instead ([boundary] grains = "outer"). If the bars are '
+        "at rest, draw them by rodsight open and set [walls] track = false."
     ]
 
 

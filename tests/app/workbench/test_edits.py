@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from rodsight.experiment.experiment import GrainGuess
+from rodsight.workbench.setup import edits
 from rodsight.workbench.setup.edits import fit_rod
 
 SIZE, MIDDLE, LARGE, SMALL = 240, 119.5, 44.0, 32.0
@@ -38,3 +39,20 @@ def test_a_rod_that_is_added_leaves_its_neighbours_room(disc, gap, expected):
     """What is seen farther out is the rim of something else."""
     found = validated((MIDDLE + gap + 30.0, MIDDLE, 30.0))
     assert fit_rod(disc, found, MIDDLE, MIDDLE, LARGE)[2] == pytest.approx(expected, abs=0.1)  # type: ignore[arg-type]
+
+
+def test_edges_that_no_rod_touches_or_that_cut_rods_are_no_walls(monkeypatch):
+    column, row = (each.ravel() for each in np.meshgrid(np.arange(5), np.arange(4)))
+    rods = GrainGuess(np.arange(20), 30.0 + 20.0 * column, 30.0 + 20.0 * row, np.full(20, 10.0))
+    found = SimpleNamespace(rods=rods)
+    shift = iter([0.5, 6.0, -6.0, 0.5])  # [px] of the edges beyond the rods
+
+    def snap(image, line, reach):
+        along = line[1] - line[0]
+        outward = np.array([-along[1], along[0]]) / np.hypot(*along)
+        return line + next(shift) * outward, 1.0
+
+    monkeypatch.setattr(edits, "snap_to_edge", snap)
+    lines = edits.find_walls(np.zeros((130, 150), np.float32), found)
+    sides = np.array([float(np.mean(lines[w, :, 1 - w % 2])) for w in range(4)])
+    assert np.abs(sides - [100.0, 120.0, 20.0, 20.0]) == pytest.approx([0.5, 0.0, 0.0, 0.5], abs=0.05)

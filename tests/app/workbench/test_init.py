@@ -109,12 +109,43 @@ def test_walls_that_cut_through_rods_are_left_out_and_named(tmp_path, capsys, mo
         [[20.0, 18.0], [150.0, 262.0]],
     ])  # fmt: skip
     monkeypatch.setattr("rodsight.workbench.setup.edits.find_walls", lambda *_: lines)
+    monkeypatch.setattr("rodsight.workbench.setup.initialise.can_be_followed", lambda _, ends, *__: ends[:, 0, 0] > -1)
     flags = ("--photographs", "shots/*.png", "--interval", 5, "--pixel-size", 1e-4, "--channel", "red")
     assert rodsight("init", tmp_path, *flags, "--radius-range", "18:30") == 0
     printed = capsys.readouterr().out.replace("\n", " ")
     assert "'left' is left out, since it would cut through" in printed
     assert "left" not in (tmp_path / "walls.csv").read_text()
     assert "bottom" in (tmp_path / "walls.csv").read_text()
+
+
+def test_bars_without_texture_are_no_walls_but_impose_the_motion_of_the_outermost_rods(tmp_path, capsys):
+    discs(tmp_path / "data")
+    folder = tmp_path / "new"
+    photographs = tmp_path / "data" / "shots" / "*.png"
+    assert rodsight("init", folder, "--photographs", photographs, "--channel", "red", "--radius-range", "18:30") == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "show nothing by which they could be followed" in printed
+    assert '([boundary] grains = "outer")' in printed
+    assert "0.0001 m is assumed" in printed
+    assert "1 s is assumed" in printed
+    made = load_experiment(folder)  # a folder that was made for photographs elsewhere
+    assert made.config.boundary.grains == "outer"
+    assert made.config.walls is None
+    assert not (folder / "walls.csv").exists()
+
+
+def test_a_folder_is_made_only_for_photographs_that_are_there_and_metres_need_a_scale(tmp_path, capsys):
+    discs(tmp_path)
+    new, there = tmp_path / "new", tmp_path / "shots"
+    for flags, named in (
+        (("--photographs", "shots/*.png"), "is no folder"),
+        (("--photographs", there / "*.jpg"), "no file matches"),
+        (("--photographs", there / "*.png", "--radii", "0.002"), "--pixel-size: is missing"),
+        (("--photographs", there / "*.png", "--pressure", "top=5e3"), "--pixel-size: is missing"),
+    ):
+        assert rodsight("init", new, *flags) == 2
+        assert named in capsys.readouterr().err
+        assert not new.exists()
 
 
 @pytest.mark.screen

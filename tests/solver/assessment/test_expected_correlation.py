@@ -7,6 +7,7 @@ import pytest
 from rodsight.solver.assessment.expected_correlation import (
     CONTRADICTED,
     MEASURES,
+    WIDEST,
     bound_correlation,
     expect_correlation,
     losses,
@@ -90,3 +91,14 @@ def test_losses_name_what_lowers_the_bound():
     found = losses(replace(BOTH, correction=1.9))
     assert max(found, key=found.__getitem__) == "correction"
     assert all(value >= 0.0 for value in found.values())
+
+
+def test_the_bound_falls_with_gaps_wider_than_any_that_was_fitted():
+    def with_gaps(ratio: float):
+        return replace(BOTH, information=replace(BOTH.information, gap_error=ratio * BOTH.information.diameter))
+
+    widest = with_gaps(WIDEST)
+    assert bound_correlation(with_gaps(0.9 * WIDEST)) == pytest.approx(bound_correlation(widest))
+    assert bound_correlation(with_gaps(2.0 * WIDEST)) == pytest.approx(0.5 * bound_correlation(widest))
+    assert losses(with_gaps(4.0 * WIDEST))["gap_error"] > 0.5 * bound_correlation(widest)
+    assert bound_correlation(with_gaps(math.nan)) > 0.0

@@ -141,3 +141,18 @@ def test_discs_that_the_file_puts_at_the_edge_are_the_boundary(tmp_path, capsys)
     assert load_experiment(tmp_path / "out").config.boundary.grains == "boundary.csv"
     import_files(capsys, "pegs", tmp_path, tmp_path / "outer", "--walls", "outer")
     assert load_experiment(tmp_path / "outer").config.boundary.grains == "outer"
+
+
+def test_forces_between_discs_that_lie_apart_are_left_out_and_their_frames_named(tmp_path, capsys):
+    discs = "".join(f"{k},{100 + 59 * k},300,30,0\n" for k in range(1, 5))
+    (tmp_path / "particle_positions.txt").write_text(
+        "".join(f"{frame},{row}\n" for frame in (3, 4) for row in discs.splitlines())
+    )
+    forces = "3,1,2,0,.5\n3,2,3,0,.4\n3,1,4,0,.9\n4,1,3,0,.2\n4,1,4,0,.3\n4,3,4,0,.7\n"
+    (tmp_path / "Adjacency_list.txt").write_text(forces)
+    printed = import_files(capsys, "pegs", tmp_path, tmp_path / "out")
+    assert [(row["frame"], row["i"], row["j"]) for row in truth_in(tmp_path / "out")] == [
+        ("0", "1", "2"), ("0", "2", "3"), ("1", "3", "4"),
+    ]  # fmt: skip
+    assert "3 forces between discs that lie apart are left out" in printed
+    assert "Most of them are in frames 1: ids of positions and forces differ there" in printed

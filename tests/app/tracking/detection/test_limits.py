@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rodsight.experiment.pictures.image import LUMA
 from rodsight.tracking.detection.circle_measurement import CircleMeasurer, MeasuredCircle
-from rodsight.tracking.detection.detect import DetectionSettings, detect_grains
+from rodsight.tracking.detection.detect import DetectionSettings, _accidental, detect_grains
 
 from tests.app.tracking.real_like import Laboratory, brown_photograph
 
@@ -98,3 +98,11 @@ def test_half_the_resolution_finds_the_same_rods() -> None:
     assert found.count == len(x)
     near = np.hypot(found.x[:, None] - (x - 0.5) / 2, found.y[:, None] - (y - 0.5) / 2).min(axis=0)
     assert near.max() < 0.5
+
+
+def test_faint_circles_of_a_size_that_no_clear_one_has_are_accidental():
+    radius = np.array([*[30.0] * 20, *[44.0] * 5, 16.0, 24.0, 31.0, 60.0])
+    quality = np.array([*[0.8] * 25, 0.3, 0.5, 0.3, 0.2])
+    good = np.ones(len(radius), bool)
+    assert np.flatnonzero(_accidental(radius, quality, good)).tolist() == [25, 28]
+    assert not _accidental(radius[6:], quality[6:], good[6:]).any()  # too few are clear

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from rodsight.tracking.walls.inner_edge import find_bars, lines_to_corners, snap_to_edge
+from rodsight.tracking.walls.inner_edge import depth_in_circles, find_bars, lines_to_corners, snap_to_edge
 
 
 @pytest.fixture
@@ -58,3 +58,11 @@ def test_lines_are_cut_where_they_meet():
     met = lines_to_corners(lines)
     np.testing.assert_allclose(met[0], [[0.0, 9.0], [9.0, 9.0]])
     np.testing.assert_allclose(met[2], [[9.0, 1.0], [0.0, 1.0]])
+
+
+def test_the_depth_of_a_line_in_circles_is_positive_inside_and_negative_beyond():
+    x, y, radius = np.array([10.0, 30.0]), np.array([10.0, 10.0]), np.array([10.0, 5.0])
+    floor = np.array([[0.0, 20.0], [40.0, 20.0]])
+    assert depth_in_circles(floor, x, y, radius) == pytest.approx(0.0)
+    assert depth_in_circles(floor - [0.0, 4.0], x, y, radius) == pytest.approx(0.4)
+    assert depth_in_circles(floor - [0.0, -2.0], x, y, radius) == pytest.approx(-0.2)
