@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
+from ...process.errors import InputError
 from ..arguments import Browser, Port, Quiet, parse_frames
 
 
@@ -96,18 +98,12 @@ def init(
     --radii 0.007,0.008,0.011 --pressure top=50e3 --friction 0.25
     """
     from ...workbench import command
-    from ...workbench.setup.initialise import (
-        SetupFlags,
-        parse_pressures,
-        parse_radii,
-        parse_radius_range,
-        parse_region,
-    )
+    from ...workbench.setup.initialise import SetupFlags
 
     flags = SetupFlags(
-        photographs, name, pixel_size, interval, parse_radii(radii), walls, parse_pressures(pressure),
+        photographs, name, pixel_size, interval, _parse_radii(radii), walls, _parse_pressures(pressure),
         {"density": density, "length": length, "friction": _number_or_word(friction)},
-        channel, parse_region(region), follow, parse_radius_range(radius_range),
+        channel, _parse_region(region), follow, _parse_radius_range(radius_range),
         parse_frames(frames), lens, grains,
     )  # fmt: skip
     return command.initialise_experiment(folder, flags, quiet=quiet)
@@ -118,3 +114,52 @@ def _number_or_word(text: str | None) -> float | str | None:
         return None if text is None else float(text)
     except ValueError:
         return text  # validated with the experiment
+
+
+def _parse_pressures(texts: Sequence[str]) -> dict[str, float]:
+    """Parse pressures [Pa] of walls from WALL=PASCAL; raise InputError for other text."""
+    found: dict[str, float] = {}
+    for text in texts:
+        wall, equals, value = text.partition("=")
+        try:
+            if not equals or not wall.strip():
+                raise ValueError
+            found[wall.strip()] = float(value)
+        except ValueError:
+            raise InputError("--pressure", text, "is not WALL=PASCAL, such as top=50e3") from None
+    return found
+
+
+def _parse_region(text: str | None) -> tuple[int, ...]:
+    """Parse a region from four whole numbers between commas; raise InputError for other text."""
+    try:
+        region = tuple(int(each) for each in text.split(",")) if text is not None else ()
+        if len(region) not in (0, 4):
+            raise ValueError
+    except ValueError:
+        raise InputError("--region", str(text), "is not X0,Y0,X1,Y1 in pixels, such as 100,50,3900,2700") from None
+    return region
+
+
+def _parse_radius_range(text: str | None) -> tuple[float, float] | None:
+    """Parse a range of radii [px] A:B; raise InputError for other text."""
+    if text is None:
+        return None
+    try:
+        least, most = (float(each) for each in text.split(":"))
+        if not 3.0 < least < most < 1e5:
+            raise ValueError
+    except ValueError:
+        raise InputError("--radius-range", text, "is not A:B in pixels, with 3 < A < B, such as 40:60") from None
+    return least, most
+
+
+def _parse_radii(text: str | None) -> tuple[float, ...]:
+    """Parse radii [m] from numbers between commas; raise InputError for other text."""
+    try:
+        radii = tuple(float(each) for each in (text or "").split(",") if each.strip())
+    except ValueError:
+        radii = (-1.0,)
+    if any(not 0.0 < radius < 1e3 for radius in radii):
+        raise InputError("--radii", str(text), "must be lengths in metres between commas, such as 0.007,0.008,0.011")
+    return radii

@@ -58,9 +58,10 @@ def print_gains(console: Console, found: Mapping[str, Sequence[FringeGain]]) -> 
         table.add_column(heading, justify="right", no_wrap=True)
     for preset, rows in found.items():
         named = [(f"{preset}, {row.seed}", row) for row in rows]
-        names = ("without", "with_fringes", "pressure", "balance")
-        mean = FringeGain(-1, *(_mean([getattr(row, name) for row in rows]) for name in names),
-                          min(row.trust for row in rows))  # fmt: skip
+        without, fringed, pressure, balance = (
+            _mean([getattr(row, name) for row in rows]) for name in ("without", "with_fringes", "pressure", "balance")
+        )
+        mean = FringeGain(-1, without, fringed, pressure, balance, min(row.trust for row in rows))
         for name, row in [*named, (f"{preset}, mean", mean)]:
             table.add_row(
                 name, f"{row.balance:.3f}", f"{row.without:.3f}", f"{row.with_fringes:.3f}",

@@ -28,4 +28,4 @@ def can_be_followed(images: tuple[Image, Image], endpoints: Array, scale: Scale,
     depth = visible_depth(images[0], endpoints, scale, MAX_BAR_DEPTH * radius)
     tracker = WallTracker(images[0], endpoints, scale, depth)
     found = tracker.follow(images[1], [tracker.first()])
-    return np.isfinite(found.endpoints).all(axis=(1, 2))
+    return np.asarray(np.isfinite(found.endpoints).all(axis=(1, 2)))

@@ -267,12 +267,15 @@ def _replace_plain_bars(
     fact = f"Bars {names} show nothing by which they could be followed to the second photograph"
     if flags.pressure:
         return [f"{fact}: give the ends of all bars in every photograph in walls.csv, or [walls] track = false."]
-    edits.set_walls(draft, found, [], "bars that cannot be followed")
+    instead = _impose_outer_rods(draft, found)
+    return [f"{fact}: {instead} If they are at rest, draw them by rodsight open and set [walls] track = false."]
+
+
+def _impose_outer_rods(draft: Draft, found: ValidationResult) -> str:
+    """Remove the walls, and let the outermost rods be the boundary; return the end of a sentence on it."""
+    edits.set_walls(draft, found, [], "no walls")
     draft.set_keys("boundary", {"boundary.grains": "outer"})
-    return [
-        f'{fact}: the motion of the outermost rods is imposed instead ([boundary] grains = "outer"). If the bars are '
-        "at rest, draw them by rodsight open and set [walls] track = false."
-    ]
+    return 'the motion of the outermost rods is imposed instead ([boundary] grains = "outer").'
 
 
 def _count_followed(tracker: Tracker | OutlineTracker, image: Image) -> int:
@@ -342,6 +345,10 @@ def _find_rods_and_walls(
                 for name, count in cut.items()
             ]
         find_discs(draft, first, found)
+        wrong = validate(draft).steps["walls"].errors
+        if wrong and not flags.pressure:  # rods that stand in no frame of four bars, or circles that are no rods
+            instead = _impose_outer_rods(draft, found)
+            notes.append(f"The bars that were found do not hold the rods ({wrong[0]}): {instead}")
     else:
         source = Path(flags.walls)
         if not source.is_file():
@@ -365,52 +372,3 @@ def _without_errors(draft: Draft, *steps: str) -> ValidationResult:
         for sentence in found.steps[name].errors:
             raise InputError(draft.file, "", sentence)
     return found
-
-
-def parse_pressures(texts: Sequence[str]) -> dict[str, float]:
-    """Parse pressures [Pa] of walls from WALL=PASCAL; raise InputError for other text."""
-    found: dict[str, float] = {}
-    for text in texts:
-        wall, equals, value = text.partition("=")
-        try:
-            if not equals or not wall.strip():
-                raise ValueError
-            found[wall.strip()] = float(value)
-        except ValueError:
-            raise InputError("--pressure", text, "is not WALL=PASCAL, such as top=50e3") from None
-    return found
-
-
-def parse_region(text: str | None) -> tuple[int, ...]:
-    """Parse a region from four whole numbers between commas; raise InputError for other text."""
-    try:
-        region = tuple(int(each) for each in text.split(",")) if text is not None else ()
-        if len(region) not in (0, 4):
-            raise ValueError
-    except ValueError:
-        raise InputError("--region", str(text), "is not X0,Y0,X1,Y1 in pixels, such as 100,50,3900,2700") from None
-    return region
-
-
-def parse_radius_range(text: str | None) -> tuple[float, float] | None:
-    """Parse a range of radii [px] A:B; raise InputError for other text."""
-    if text is None:
-        return None
-    try:
-        least, most = (float(each) for each in text.split(":"))
-        if not 3.0 < least < most < 1e5:
-            raise ValueError
-    except ValueError:
-        raise InputError("--radius-range", text, "is not A:B in pixels, with 3 < A < B, such as 40:60") from None
-    return least, most
-
-
-def parse_radii(text: str | None) -> tuple[float, ...]:
-    """Parse radii [m] from numbers between commas; raise InputError for other text."""
-    try:
-        radii = tuple(float(each) for each in (text or "").split(",") if each.strip())
-    except ValueError:
-        radii = (-1.0,)
-    if any(not 0.0 < radius < 1e3 for radius in radii):
-        raise InputError("--radii", str(text), "must be lengths in metres between commas, such as 0.007,0.008,0.011")
-    return radii

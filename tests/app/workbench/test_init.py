@@ -134,6 +134,19 @@ def test_bars_without_texture_are_no_walls_but_impose_the_motion_of_the_outermos
     assert not (folder / "walls.csv").exists()
 
 
+def test_bars_that_do_not_hold_the_rods_do_not_end_the_set_up(tmp_path, capsys, monkeypatch):
+    discs(tmp_path)
+    lines = np.array([  # each runs the wrong way round
+        [[340.0, 262.0], [20.0, 262.0]], [[334.0, 18.0], [334.0, 262.0]], [[20.0, 18.0], [334.0, 18.0]],
+        [[20.0, 262.0], [20.0, 18.0]],
+    ])  # fmt: skip
+    monkeypatch.setattr("rodsight.workbench.setup.edits.find_walls", lambda *_: lines)
+    flags = ("--photographs", "shots/*.png", "--channel", "red", "--radius-range", "18:30")
+    assert rodsight("init", tmp_path, *flags) == 0
+    assert "The bars that were found do not hold the rods" in capsys.readouterr().out
+    assert load_experiment(tmp_path).config.boundary.grains == "outer"
+
+
 def test_a_folder_is_made_only_for_photographs_that_are_there_and_metres_need_a_scale(tmp_path, capsys):
     discs(tmp_path)
     new, there = tmp_path / "new", tmp_path / "shots"
