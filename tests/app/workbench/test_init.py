@@ -151,7 +151,7 @@ def test_a_folder_is_made_only_for_photographs_that_are_there_and_metres_need_a_
     discs(tmp_path)
     new, there = tmp_path / "new", tmp_path / "shots"
     for flags, named in (
-        (("--photographs", "shots/*.png"), "is no folder"),
+        (("--photographs", "shots/*.png"), "no file matches"),
         (("--photographs", there / "*.jpg"), "no file matches"),
         (("--photographs", there / "*.png", "--radii", "0.002"), "--pixel-size: is missing"),
         (("--photographs", there / "*.png", "--pressure", "top=5e3"), "--pixel-size: is missing"),
