@@ -128,14 +128,12 @@ def study(
 
     Example: rodsight study worlds --worlds shear --seeds 1 --grains 150
     """
-    if subject == "real":
-        from ..measured_forces import study_measured
+    if subject in ("real", "fringes"):
+        from ..measured_forces import study_fringes, study_measured
 
+        if subject == "fringes":
+            return study_fringes(seeds, 200 if grains is None else grains, out, quiet=quiet)
         return study_measured(folder, page, frame, as_json=as_json)
-    if subject == "fringes":
-        from ..measured_forces import study_fringes
-
-        return study_fringes(seeds, 200 if grains is None else grains, out, quiet=quiet)
     from ...study.scenarios.scenario_score import StudyPlan
     from ...synthetic.scenarios.scenario_folder import GRAINS
 
