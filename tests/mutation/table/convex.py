@@ -116,7 +116,8 @@ MUTANTS = [
     *mutants_of(
         "solver/convex/resistance.py",
         SLIDING,
-        ("if turned < min(REVERSED * before, MOST_GAP):", "if turned < MOST_GAP:"),
+        ("if turned < min(REVERSED * before, before - LEAST_GAP, MOST_GAP):", "if turned < MOST_GAP:"),
+        ("before - LEAST_GAP, MOST_GAP):", "MOST_GAP):"),
         ('if name != "wall_friction" or walls >= LEAST_WALLS', "if True"),
         ("> MOST_FRICTION * given.friction:", "> 1e9 * given.friction:"),
         ("min(before, friction))", "before)"),
