@@ -5,10 +5,11 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from rodsight.cli.main import main
 from rodsight.synthetic.photoelastic.fringe_photographs import make_fringed
 from rodsight.synthetic.photoelastic.stress_optics import fringe_light, stress_difference
 from rodsight.tracking.fringes import squared_gradients
+
+from tests.program import rodsight
 
 pytestmark = pytest.mark.unit
 
@@ -69,7 +70,7 @@ def test_photographs_have_their_truth(tmp_path):
 
 @pytest.mark.slow
 def test_fringes_improve_the_forces_of_discs_whose_overlaps_noise_hides(tmp_path, capsys):
-    assert main(["study", "fringes", "--seeds", "1", "--grains", "100", "--out", str(tmp_path), "--quiet"]) == 0
+    assert rodsight("study", "fringes", "--seeds", "1", "--grains", "100", "--out", tmp_path, "--quiet") == 0
     printed = capsys.readouterr().out
     rows = {line.split("  ")[0]: [float(cell) for cell in line.split()[2:]] for line in printed.splitlines()[2:]}
     assert {"fringes, 1", "stiff_fringes, 1", "fringes, mean", "stiff_fringes, mean"} == set(rows)
@@ -78,4 +79,4 @@ def test_fringes_improve_the_forces_of_discs_whose_overlaps_noise_hides(tmp_path
     assert gain > 0.05
     assert pressures > 0.9
     assert margin > -0.03  # the trust is a lower bound
-    assert rows["fringes, 1"][1] > without  # their overlaps say more
+    assert rows["fringes, 1"][1] > without  # their overlaps show more
