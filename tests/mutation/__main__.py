@@ -17,7 +17,7 @@ LAST_TABLE = Path(__file__).with_name("last_table.md")
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__)
-    parser.add_argument("--last", action="store_true", help="only print the table of the last complete run")
+    parser.add_argument("--last", action="store_true", help="only print the stored table")
     parser.add_argument("--check", action="store_true", help="only check that every mutant's text is found once")
     parser.add_argument("--room", default="", help="only mutants of rooms that begin so, like solver/nlgs; not stored")
     parser.add_argument("--record", type=Path, help="file of verdicts: mutants in it are not tried again, others added")

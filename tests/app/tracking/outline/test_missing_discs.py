@@ -11,8 +11,10 @@ from rodsight.experiment.pictures.picture_file import read_photograph
 from rodsight.experiment.reading.tables import read_table
 from rodsight.tracking.detection.detect import Detection
 from rodsight.tracking.outline.missing_discs import add_missing_discs
+from rodsight.tracking.outline.rim_image import RimImage
+from rodsight.tracking.outline.rim_kernels import QUALITY, VIEW
 
-from tests.app.tracking.outline.discs import KINDS, lay_row_by_row, photograph_discs
+from tests.app.tracking.outline.discs import KINDS, WHITE, Light, lay_row_by_row, photograph_discs
 
 SAMPLE = Path(__file__).parents[4] / "sample_data" / "shear"
 RADII = (13.0, 18.0)  # [px]
@@ -56,6 +58,36 @@ def test_discs_without_sizes_stay_as_they_are() -> None:
     found = add_missing_discs(np.zeros(SHAPE, np.float32), given)
     for each in fields(Detection):
         np.testing.assert_array_equal(getattr(found, each.name), getattr(given, each.name))
+
+
+def with_a_hole(faint: float = 0.0) -> tuple[np.ndarray, Detection]:
+    """Discs but one, and those detected; faint: contrast of a disc in the hole, as a fraction of the others'."""
+    x, y, radius = lay_row_by_row(10, 10, RADII)
+    hole = np.arange(len(x)) == MISSED[2]
+    image = photograph_discs(WHITE, SHAPE, x[~hole], y[~hole], radius[~hole], np.zeros((~hole).sum()), 1)
+    light = Light(WHITE.outside + faint * (WHITE.inside - WHITE.outside), WHITE.outside)
+    inside = photograph_discs(light, SHAPE, x[hole], y[hole], radius[hole], np.zeros(1), 2)
+    return np.maximum(image, inside), detection_of(x[~hole], y[~hole], radius[~hole])
+
+
+@pytest.mark.parametrize(("faint", "added"), [(0.95, 1), (0.25, 0)])
+def test_a_rim_must_be_nearly_as_strong_as_those_of_its_size(faint: float, added: int) -> None:
+    image, given = with_a_hole(faint)
+    assert add_missing_discs(image, given).count == given.count + added
+
+
+@pytest.mark.parametrize("column", [QUALITY, VIEW])
+def test_a_disc_needs_an_edge_and_a_view_of_its_rim(column: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    image, given = with_a_hole(0.95)
+    measure = RimImage.measure
+
+    def hidden(self: RimImage, *given: np.ndarray) -> np.ndarray:
+        found = measure(self, *given).copy()
+        found[:, column] = 0.25
+        return found
+
+    monkeypatch.setattr(RimImage, "measure", hidden)
+    assert add_missing_discs(image, given).count == given.count
 
 
 @pytest.mark.screen
