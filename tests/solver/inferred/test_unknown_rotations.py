@@ -51,3 +51,10 @@ def test_rod_without_contacts_does_not_rotate() -> None:
         np.array([R]), centre, np.full((2, 1), np.nan), np.ones((2, 1), bool), np.empty((2, 0, 2, 2))
     )
     assert np.array_equal(rotated, np.zeros((2, 1)))
+
+
+def test_rod_rolls_on_the_plates_that_are_known() -> None:
+    centre, plates = between_plates(1e-3)
+    plates[1, 1] = np.nan  # the lid is not found in the second photograph
+    rotated = fill_unknown_rotations(np.array([R]), centre, np.full((3, 1), np.nan), np.ones((3, 1), bool), plates)
+    assert rotated[:, 0] == pytest.approx([0.0, -0.5e-3 / R, -1e-3 / R], rel=2e-3)  # the floor alone shows it
