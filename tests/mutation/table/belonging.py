@@ -35,9 +35,13 @@ MUTANTS = [
         ("sorted(listed.keys() - now.keys())", "[]"),
         ("sorted(now.keys() - listed.keys())", "[]"),
         ("FORCES.alone) or piece", "FORCES.alone) and piece"),
-        ("made_from is not None and made_from != results", "False"),
         ("reasons = reasons or _changed_settings(owner.name, _settings_now(owner), settings)", "pass"),
         ("LISTED = 3", "LISTED = 30"),
+    ),
+    *mutants_of(
+        "app/out_of_date.py",
+        "tests/app/cli/test_recording_state.py",
+        ("made_from is not None and made_from != results", "False"),
     ),
     *mutants_of(
         "app/run_folder.py",
