@@ -16,7 +16,8 @@ from ..bodies.grains import Array
 from ..quantity import Quantity
 from .touching_pairs import TouchingFit, count_classes, find_near_pairs, fit_touching_pairs
 
-MOST_FRAMES = 8  # of which gaps are read, evenly over the sequence
+MOST_FRAMES = 8  # of which gaps are read, evenly over the sequence …
+MOST_POSES, FEWEST_FRAMES = 20_000, 2  # … and poses in them: more show the same distortion; frames at least
 FEWEST_PAIRS = 100  # in a frame
 SIGNIFICANT = 5.0  # standard errors
 EXPLAINED = 0.95  # greatest ratio of the robust scatter of touching gaps after a correction to that before
@@ -217,8 +218,9 @@ def find_camera_distortion(
     if not len(present):
         return None
     middle = 0.5 * (present.min(axis=0) + present.max(axis=0))
+    count = min(max(min(MOST_FRAMES, MOST_POSES // len(radius)), FEWEST_FRAMES), len(position))
     reading = _Reading(
-        position[np.unique(np.linspace(0, len(position) - 1, min(MOST_FRAMES, len(position))).astype(int))],
+        position[np.unique(np.linspace(0, len(position) - 1, count).astype(int))],
         radius, size_class, middle, 0.5 * float(np.ptp(present, axis=0).max()),
     )  # fmt: skip
     pairs = reading.find_pairs(None)

@@ -42,7 +42,8 @@ def measure_precision(grains: Grains, snapshots: Sequence[Snapshot]) -> Precisio
     Returns
     -------
     Precision or None
-        None where fewer than MIN_GAPS pairs touch in three consecutive photographs.
+        None where fewer than MIN_GAPS pairs touch in three consecutive photographs, or where gaps do not vary, as
+        between photographs that are interpolated.
 
     Notes
     -----
@@ -57,6 +58,8 @@ def measure_precision(grains: Grains, snapshots: Sequence[Snapshot]) -> Precisio
     if len(mean) < MIN_GAPS:
         return None
     sigma = NORMAL * float(np.median(np.abs(gaps[0] - 2.0 * gaps[1] + gaps[2]))) / np.sqrt(12.0)
+    if not sigma > 0.0:
+        return None
     overlap = float(np.sqrt(max(np.mean(mean**2) - 2.0 / 3.0 * sigma**2, 0.0)))
     return Precision(sigma, overlap, len(mean))
 

@@ -63,3 +63,8 @@ def test_noise_alone_gives_no_overlap():
 def test_contradiction_is_found_in_both_directions():
     assert corrected_precision(Precision(5e-6, 0.0, 1000), [1e-5], 0.0)[0] == pytest.approx(0.5)
     assert corrected_precision(Precision(0.8e-5, 0.0, 1000), [1e-5], 0.0)[0] == 1.0
+
+
+def test_gaps_that_never_vary_as_in_interpolated_photographs_give_no_precision():
+    grains, snapshots = touching(0.0, 5e-5)
+    assert measure_precision(grains, snapshots) is None
