@@ -33,14 +33,17 @@ def sequence():
     ensemble = SimpleNamespace(probability=ContactProbabilitySettings(1e-6))
     settings = SimpleNamespace(for_radii=lambda _: SimpleNamespace(ensemble=ensemble), workers=1)
     return SimpleNamespace(
-        packing=packing, snapshots=snapshots, settings=settings, friction_measured=False, base_gravity=2.0
-    )
+        packing=packing, snapshots=snapshots, settings=settings, friction_measured=False, base_gravity=2.0,
+        tracks=None, walls=None,
+    )  # fmt: skip
 
 
-def examine(sequence, monkeypatch, cause: str) -> list[str]:
+def examine(sequence, monkeypatch, cause: str, sliding: float | None = 0.2) -> list[str]:
     """Return the evidence of the findings where a model resists; also note the first frame that is compared."""
     calls = []
     found = Resistance(cause, GIVEN, 0.4, FOUND, 0.1)
+    quality = None if sliding is None else SimpleNamespace(sliding=sliding)
+    monkeypatch.setattr(module, "measure_data_quality", lambda *_: quality)
     monkeypatch.setattr(module, "find_in_sequence", lambda *given: calls.append(given) or found)
     findings = module.examine_resistance(sequence)
     ((_, _, first, *_),) = calls
@@ -61,6 +64,13 @@ def test_nothing_is_reported_without_a_winner_or_where_the_friction_was_measured
     measured = SimpleNamespace(**vars(sequence) | {"friction_measured": True})
     assert examine(measured, monkeypatch, "friction") == []
     assert len(examine(measured, monkeypatch, "wall_friction")) == 1
+
+
+def test_an_attraction_is_named_only_where_enough_contacts_slide(sequence, monkeypatch) -> None:
+    assert examine(sequence, monkeypatch, "adhesion", 0.05) == []
+    assert examine(sequence, monkeypatch, "adhesion", None) == []
+    assert len(examine(sequence, monkeypatch, "adhesion", 0.15)) == 1
+    assert len(examine(sequence, monkeypatch, "base_friction", 0.05)) == 1
 
 
 def test_the_coefficient_of_a_base_needs_the_scale_of_the_forces(sequence, monkeypatch) -> None:
