@@ -42,16 +42,27 @@ def correct_walls_in_picture(
     if circular.any():  # a circle keeps its shape
         centre, rim, angle = circle_parameters(endpoints[:, circular])
         moved[:, circular] = circle_ends(found.correct_scaled(centre, scale), scale * rim, angle)
-    apart, seen = (
-        usual_wall_gaps(position, ends[:, ~circular], radius) for ends in (endpoints, moved)
-    )  # fmt: skip
-    both = np.isfinite(apart) & np.isfinite(seen)
-    given_fits = np.linalg.norm(apart[both]) < np.linalg.norm(seen[both])
-    return endpoints if given_fits else moved
+    straight = ~circular
+    apart, seen = (_wall_gaps(position, ends[:, straight], radius) for ends in (endpoints, moved))
+    both = np.isfinite(apart[:, 0]) & np.isfinite(seen[:, 0])
+    if np.linalg.norm(apart[both, 0]) < np.linalg.norm(seen[both, 0]):
+        return endpoints
+    moved[:, straight] = _touched(moved[:, straight], seen)
+    return moved
 
 
-def usual_wall_gaps(position: Array, endpoints: Array, radius: Array) -> Array:
-    """Find the gap of the grains that touch every straight wall.
+def _touched(endpoints: Array, gap: Array) -> Array:
+    """Move straight walls to the grains that touch them.
+
+    A bar that is seen through a lens is no straight line: its ends, or a line through its middle, are off by the
+    curvature, the same in all photographs.
+    """
+    shift = np.nan_to_num(np.stack([gap[:, 0] - 0.5 * gap[:, 1], gap[:, 0] + 0.5 * gap[:, 1]], axis=1))
+    return endpoints - shift[None, :, :, None] * outward_normals(endpoints)[:, :, None]
+
+
+def _wall_gaps(position: Array, endpoints: Array, radius: Array) -> Array:
+    """Find the gap of the grains that touch every straight wall, and how it grows along the wall.
 
     Parameters
     ----------
@@ -65,18 +76,19 @@ def usual_wall_gaps(position: Array, endpoints: Array, radius: Array) -> Array:
     Returns
     -------
     Array
-        (w,) [m]; NaN where too few grains are near.
+        (w, 2) [m] in the middle, and its change from end 0 to end 1; NaN where too few grains are near.
     """
     diameter = 2.0 * float(radius.mean())
     normal = outward_normals(endpoints)
-    usual = np.full(endpoints.shape[1], np.nan)
+    usual = np.full((endpoints.shape[1], 2), np.nan)
     for w in range(len(usual)):
         first, along = endpoints[:, w, 0], endpoints[:, w, 1] - endpoints[:, w, 0]
         arm = position - first[:, None]
         gap = -np.einsum("fnk,fk->fn", arm, normal[:, w]) - radius
         place = np.einsum("fnk,fk->fn", arm, along) / np.sum(along**2, axis=-1)[:, None]
-        near = gap[(np.abs(gap) < NEAR * diameter) & (place > 0.0) & (place < 1.0)]
-        if len(near) >= FEWEST_GAPS:
-            column = np.full((len(near), 1), -1.0)
-            usual[w] = fit_touching_pairs(near, column, np.array([True]), diameter, len(position)).value[0]
+        near = (np.abs(gap) < NEAR * diameter) & (place > 0.0) & (place < 1.0)
+        if near.sum() >= FEWEST_GAPS:
+            design = np.column_stack([np.full(near.sum(), -1.0), 0.5 - place[near]])
+            fit = fit_touching_pairs(gap[near], design, np.array([True, False]), diameter, len(position))
+            usual[w] = fit.value
     return usual

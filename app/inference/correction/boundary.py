@@ -60,7 +60,7 @@ def correct_camera(
     failed : collection of int
         Unusable frames.
     radii_known : bool
-        Whether the radii are exact enough to give the pixel size of a distorted picture.
+        Whether the radii are exact, and give the pixel size of a distorted picture; else they are adapted.
 
     Returns
     -------
@@ -84,16 +84,22 @@ def correct_camera(
     if walls.count:
         if not found.applied:  # calibration finds a lesser distortion with the walls
             return tracks, walls, "", None
-        scale = found.common_scale() if radii_known and not soft else 1.0
-        corrected = found.correct_scaled(position, scale)
-        ends = correct_walls_in_picture(found, walls.endpoints, walls.side, corrected, tracks.radius, scale=scale)
+        # Touching surfaces meet by other distances, or by other radii where these were read in the same picture.
+        scale = 1.0 if soft else found.common_scale()
+        distance, radius = (scale, tracks.radius) if radii_known else (1.0, tracks.radius / scale)
+        corrected = found.correct_scaled(position, distance)
+        ends = correct_walls_in_picture(found, walls.endpoints, walls.side, corrected, radius, scale=distance)
         sentences = found.describe()
-        if scale != 1.0:
-            sentences[0] += f", and distances were multiplied by {scale:.4f}, so that grains of the known radii meet"
+        if not soft:
+            changed = (
+                f"distances were multiplied by {scale:.4f}" if radii_known else f"radii were divided by {scale:.4f}"
+            )
+            sentences[0] += f", and {changed}, so that touching grains meet"
         if ends is walls.endpoints:
             sentences.append("walls were not in this picture: they are used as given")
         kept = np.where(tracks.present[..., None], corrected, tracks.position)
-        return replace(tracks, position=kept), replace(walls, endpoints=ends), "; ".join(sentences), found
+        moved = replace(tracks, position=kept, radius=radius)
+        return moved, replace(walls, endpoints=ends), "; ".join(sentences), found
     sentences, radius = found.describe(), tracks.radius
     correction = found.class_correction(_noise_of_gaps(material, tracks, walls, failed)) if soft else None
     if correction is not None:

@@ -63,6 +63,16 @@ def test_a_stretched_picture_is_restored_with_its_walls(given) -> None:
     assert "distances were multiplied by 0.995" in sentence
 
 
+def test_radii_that_were_read_in_the_picture_are_adapted_instead_of_distances(given) -> None:
+    tracks, walls = given
+    seen = replace(tracks, position=stretched(tracks.position)), replace(walls, endpoints=stretched(walls.endpoints))
+    corrected, moved, sentence, _ = correct_camera(MATERIAL, *seen, (), radii_known=False)
+    np.testing.assert_allclose(corrected.radius / tracks.radius, 1.005, atol=1e-3)
+    assert "radii were divided by" in sentence
+    ratio = distances(corrected, moved) / np.maximum(distances(*given), 1e-3)
+    assert np.median(ratio[ratio > 0.5]) == pytest.approx(1.005, abs=1e-3)
+
+
 def test_walls_that_were_not_in_the_picture_stay(given) -> None:
     tracks, walls = given
     middle, width = tracks.position[0].mean(axis=0), 0.5 * float(np.ptp(tracks.position[0], axis=0).max())
