@@ -14,6 +14,7 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
+from scipy import sparse
 
 from ..bodies.grains import Array
 from ..parallel import parallel_map
@@ -22,7 +23,7 @@ from .grain_blocks import block_balance
 from .program import Balance, ConvexSettings
 
 # `all_friction` is that of grains, with that of walls in its given proportion.
-Parameter = Literal["friction", "all_friction", "wall_friction", "base_drag", "attraction"]
+Parameter = Literal["friction", "all_friction", "wall_friction", "base_drag", "attraction", "rolling"]
 # Trial values of each parameter; a search stops where the gap rises again.
 TRIALS: dict[Parameter, tuple[float, ...]] = {
     "friction": tuple(np.geomspace(0.04, 1.2, 24).tolist()),
@@ -30,6 +31,7 @@ TRIALS: dict[Parameter, tuple[float, ...]] = {
     "wall_friction": (0.01, 0.05, 0.1, 0.15, 0.2, 0.25, 0.32, 0.4, 0.5, 0.65, 0.8, 1.0),
     "base_drag": (0.0, 0.02, 0.04, 0.06, 0.08, 0.1, 0.125, 0.15, 0.2, 0.25, 0.3, 0.4),
     "attraction": (0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8),
+    "rolling": (0.0, 0.03, 0.06, 0.09, 0.12, 0.16, 0.2, 0.3),
 }
 ROUNDS = 3  # over the parameters of a model, each of which shifts the best values of the others
 SAME = 0.02  # relative change of the gap below which further rounds change nothing
@@ -43,6 +45,7 @@ class SlidingModel:
     wall_friction: float
     base_drag: float = 0.0  # on a mean grain that slides on the base
     attraction: float = 0.0  # of grains in contact
+    rolling: float = 0.0  # moment of a contact over f_n and its rolling radius
 
     def value(self, name: Parameter) -> float:
         """The value of a parameter."""
@@ -60,11 +63,12 @@ class ResistedFrame(SlidingFrame):
     """Balance without drag, and sliding of one frame."""
 
     drag: Array  # (m,) load b of a unit of `base_drag`
+    roll: sparse.csr_matrix  # (m, 2c) what a unit of `rolling` adds to H
     grain_count: int
 
     def reversed(self) -> ResistedFrame:
         """The same frame with its motion reversed."""
-        return replace(self, slip=-self.slip, drag=-self.drag)
+        return replace(self, slip=-self.slip, drag=-self.drag, roll=-self.roll)
 
     def balance_of(self, model: SlidingModel) -> Balance:
         """The balance under a model.
@@ -76,12 +80,13 @@ class ResistedFrame(SlidingFrame):
         given, load = self.balance, self.balance.load
         wall = self.contacts.with_wall
         friction = np.where(wall, model.wall_friction, model.friction)
-        if model.base_drag == 0.0 and model.attraction == 0.0:
+        if model.base_drag == 0.0 and model.attraction == 0.0 and model.rolling == 0.0:
             return replace(given, friction=friction)
+        matrix = given.matrix if model.rolling == 0.0 else sparse.csr_matrix(given.matrix + model.rolling * self.roll)
         attraction = np.where(wall, 0.0, model.attraction * self.probability)
-        load = load + model.base_drag * self.drag + given.matrix[:, : given.contact_count] @ attraction
-        blocks = block_balance(given.matrix, load, self.grain_count, given.contact_count)
-        return replace(given, load=load, grains=blocks, friction=friction)
+        load = load + model.base_drag * self.drag + matrix[:, : given.contact_count] @ attraction
+        blocks = block_balance(matrix, load, self.grain_count, given.contact_count)
+        return replace(given, matrix=matrix, load=load, grains=blocks, friction=friction)
 
     def under(self, model: SlidingModel) -> SlidingFrame:
         """The sliding with the balance under a model."""

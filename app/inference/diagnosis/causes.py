@@ -46,6 +46,10 @@ CAUSES: dict[str, Cause] = {
         "contacts also pull, and this model lets them only push",
         "take the forces for patterns, not for values: this model has no attraction",
     ),
+    "rolling_resistance": Cause(
+        "contacts exert moments, and this model lets them exert none",
+        "take the forces for patterns, not for values: this model has no rolling resistance",
+    ),
     "inertia": Cause(
         "part of the forces accelerates rods, and their balance lacks it",
         "load more slowly, or photograph at rest",

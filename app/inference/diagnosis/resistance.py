@@ -45,6 +45,9 @@ def examine_resistance(sequence: CorrectedSequence) -> list[Finding]:
             + _coefficient(sequence, found)
         ),
         "adhesion": lambda: f"rods attract one another by {100.0 * found.found.attraction:.0f} % of the mean force",
+        "rolling_resistance": lambda: (
+            f"contacts resist rolling by {found.found.rolling:.2f} of f_n times the rolling radius"
+        ),
     }
     left = f"what contradicts the sliding falls from {100.0 * found.given_gap:.0f} to {100.0 * found.found_gap:.0f} %"
     return [finding(found.cause, f"{words[found.cause]()}; with that, {left}")]

@@ -41,6 +41,7 @@ TRUE_CAUSE: dict[ScenarioName, tuple[str, ...]] = {
     "outliers": ("outlier_tracks",), "one_jump": ("outlier_tracks",), "missing_poses": ("missing_poses",),
     "base_friction": ("base_friction",), "smooth_walls": ("wall_friction",), "rough_walls": ("wall_friction",),
     "smooth_walls_spread": ("wall_friction",), "cohesion": ("adhesion",), "strong_cohesion": ("adhesion",),
+    "rolling": ("rolling_resistance",),
     "inertia": ("inertia",), "strong_inertia": ("inertia",), "nearly_jammed": ("base_friction",),
 }  # fmt: skip
 # Of several scenarios with the same input error but for its size, one.

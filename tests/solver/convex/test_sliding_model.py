@@ -46,6 +46,21 @@ def test_an_attraction_is_a_shift_of_the_normal_forces(frames):
     assert attracted.matrix @ shifted - attracted.load == pytest.approx(before, abs=1e-12)
 
 
+def test_contacts_that_resist_rolling_turn_both_grains_against_their_relative_rotation(frames):
+    packing, _, (frame, *_) = frames
+    _, snapshots = sheared_frames(6)
+    turned = (snapshots[2].rotation - snapshots[0].rotation)[snapshots[1].present & packing.grains.free]
+    c, n = frame.balance.contact_count, frame.grain_count
+    fn = np.linspace(1.0, 2.0, c)
+    added = frame.balance_of(replace(GIVEN, rolling=0.1)).matrix - frame.balance.matrix
+    assert abs(added[:, c:]).sum() == 0.0  # by f_n alone
+    moment = added[2 * n : 3 * n] @ np.concatenate([fn, np.zeros(c)])
+    assert np.abs(added @ np.concatenate([fn, np.zeros(c)])).sum() == pytest.approx(np.abs(moment).sum())
+    assert np.abs(moment).max() > 0.0
+    assert float(moment @ turned) < 0.0  # the moments take power from the rotation
+    assert frame.reversed().roll.toarray() == pytest.approx(-frame.roll.toarray())
+
+
 def test_the_base_drags_against_the_motion(frames):
     packing, unit, (frame, *_) = frames
     _, snapshots = sheared_frames(6)
@@ -162,7 +177,7 @@ def test_the_friction_of_walls_follows_that_of_grains_in_proportion():
     assert model.with_value("friction", 0.3) == SlidingModel(0.3, 0.1, 0.05)
 
 
-GAPS = {"friction": 0.4, "wall_friction": 0.4, "base_friction": 0.4, "adhesion": 0.4}
+GAPS = {"friction": 0.4, "wall_friction": 0.4, "base_friction": 0.4, "adhesion": 0.4, "rolling": 0.4}
 
 
 @pytest.mark.parametrize(
@@ -174,6 +189,10 @@ GAPS = {"friction": 0.4, "wall_friction": 0.4, "base_friction": 0.4, "adhesion":
         ({"wall_friction": 0.1, "adhesion": 0.11}, ""),
         ({"base_friction": 0.3}, ""),  # a rival that leaves so much does not explain the sliding
         ({"adhesion": 0.15, "friction": 0.2}, "friction"),
+        ({"rolling": 0.2}, "rolling_resistance"),
+        ({"rolling": 0.2, "friction": 0.24}, "friction"),  # another friction explains nearly as much
+        ({"rolling": 0.3}, ""),
+        ({"rolling": 0.1, "wall_friction": 0.2}, "wall_friction"),
     ],
 )
 def test_only_a_clear_winner_is_named(frames, monkeypatch, gaps, cause):
@@ -183,7 +202,9 @@ def test_only_a_clear_winner_is_named(frames, monkeypatch, gaps, cause):
         resistance,
         "compare_models",
         lambda frames, given, rivals, workers: [
-            FittedModel(given, gap, True) for name, gap in fitted.items() if resistance.RIVALS[name] in rivals
+            FittedModel(given, gap, True)
+            for name, gap in fitted.items()
+            if resistance.RIVALS.get(name, (name,)) in rivals
         ],
     )
     monkeypatch.setattr(resistance, "LEAST_WALLS", 0)
@@ -281,7 +302,7 @@ def test_walls_need_contacts_and_a_friction_limits(frames, monkeypatch):
         "compare_models",
         lambda _, given, rivals, __: [
             FittedModel(replace(given, friction=0.8), only.get(name, 0.45), True)
-            for name, free in resistance.RIVALS.items()
+            for name, free in (*resistance.RIVALS.items(), ("rolling", ("rolling",)))
             if free in rivals
         ],
     )

@@ -17,12 +17,13 @@ from rodsight.solver.nlgs.chain import ChainSettings, force_scale
 from tests.solver.sequence.test_frames import sheared_frames
 
 GIVEN = SlidingModel(0.25, 0.31)
-FOUND = SlidingModel(0.4 * BIAS, 0.07, 0.12, 0.3)
+FOUND = SlidingModel(0.4 * BIAS, 0.07, 0.12, 0.3, 0.08)
 TEXTS = {
     "friction": "rods slide as with a friction of 0.40, not 0.25",
     "wall_friction": "rods slide on walls as with a friction of 0.07, not 0.31, and on one another as with 0.40",
     "base_friction": "the base drags each rod by 12 % of the mean force",
     "adhesion": "rods attract one another by 30 % of the mean force",
+    "rolling_resistance": "contacts resist rolling by 0.08 of f_n",
     "photographs_reversed": "against it in reverse order",
 }
 
@@ -57,6 +58,11 @@ def test_a_finding_states_what_was_found_and_how_much_it_explains(sequence, monk
     (evidence,) = examine(sequence, monkeypatch, cause)
     assert TEXTS[cause] in evidence
     assert evidence.endswith("with that, what contradicts the sliding falls from 40 to 10 %")
+
+
+def test_an_attraction_is_named_only_where_rods_slide(sequence, monkeypatch) -> None:
+    assert examine(sequence, monkeypatch, "adhesion", sliding=0.05) == []
+    assert len(examine(sequence, monkeypatch, "rolling_resistance", sliding=0.05)) == 1
 
 
 def test_nothing_is_reported_without_a_winner_or_where_the_friction_was_measured(sequence, monkeypatch) -> None:
