@@ -51,7 +51,7 @@ UNSTATED: dict[str, tuple[Parameter, ...]] = {"wall_friction": ("wall_friction",
 class Resistance:
     """The model that explains the sliding."""
 
-    cause: str  # a name of RIVALS, "photographs_reversed" or "rolling_resistance"; empty: none is clearly better than the given model
+    cause: str  # of RIVALS, "photographs_reversed" or "rolling_resistance"; empty: none is better than the given
     given: SlidingModel
     given_gap: float
     found: SlidingModel
@@ -73,8 +73,8 @@ def find_resistance(frames: Sequence[ResistedFrame], given: SlidingModel, worker
     -------
     Resistance or None
         None where nothing slides. A rival is named if its parameters are determined, its gap is below .62 times that of
-        the given model and of another friction alone, .85 times that of every other rival, and below .25. Where none of these wins, a resistance to rolling is named
-        that lowers the gap to below .8 times its value, also of another friction alone.
+        the given model and of another friction alone, .85 times that of every other rival, and below .25. Where none of
+        these wins, a resistance to rolling is named that leaves less than .8 of the gap of both.
     """
     before = power_gap(frames, given)
     if not np.isfinite(before):
@@ -97,7 +97,8 @@ def find_resistance(frames: Sequence[ResistedFrame], given: SlidingModel, worker
             return Resistance(best, given, before, sound[best].model, sound[best].gap)
         return nothing  # it is one of two, and friction alone is worse than either
     (rolling,) = compare_models(frames, given, [("rolling",)], workers)
-    if rolling.enclosed and rolling.gap < min(ROLLING * min(before, friction), before - LEAST_GAP, MOST_GAP):
+    least = min(MOST_GAP, before - LEAST_GAP, ROLLING * before, ROLLING * friction)
+    if rolling.enclosed and rolling.gap < least:
         return Resistance("rolling_resistance", given, before, rolling.model, rolling.gap)
     if "friction" in sound and _is_clearly_less(friction, before):
         return Resistance("friction", given, before, sound["friction"].model, friction)

@@ -100,8 +100,8 @@ MUTANTS = [
         ("np.where(wall, 0.0, model.attraction * self.probability)", "model.attraction * self.probability"),
         ("model.base_drag * self.drag", "self.drag"),
         (
-            "return replace(given, load=load, grains=blocks, friction=friction)",
-            "return replace(given, load=load, friction=friction)",
+            "return replace(given, matrix=matrix, load=load, grains=blocks, friction=friction)",
+            "return replace(given, matrix=matrix, load=load, friction=friction)",
         ),
         ("power_gaps((each.under(model) for each in frames), settings)", "power_gaps(frames, settings)"),
         (

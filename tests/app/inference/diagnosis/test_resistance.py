@@ -60,11 +60,6 @@ def test_a_finding_states_what_was_found_and_how_much_it_explains(sequence, monk
     assert evidence.endswith("with that, what contradicts the sliding falls from 40 to 10 %")
 
 
-def test_an_attraction_is_named_only_where_rods_slide(sequence, monkeypatch) -> None:
-    assert examine(sequence, monkeypatch, "adhesion", sliding=0.05) == []
-    assert len(examine(sequence, monkeypatch, "rolling_resistance", sliding=0.05)) == 1
-
-
 def test_nothing_is_reported_without_a_winner_or_where_the_friction_was_measured(sequence, monkeypatch) -> None:
     assert examine(sequence, monkeypatch, "") == []
     measured = SimpleNamespace(**vars(sequence) | {"friction_measured": True})
