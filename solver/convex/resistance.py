@@ -30,7 +30,8 @@ FEWEST = 2  # of these
 LEAST_WALLS = 12  # contacts with walls from which on their friction is a rival
 MOST_FRICTION = 3.0  # times the given friction: with more, forces on a few contacts explain any sliding
 # Gap with a rolling resistance over that of the given model and of another friction, below which it is named. On
-# sheared packings of 200 rods whose contacts resist rolling it is .64 to .68, and without it 1 (seeds 20 to 22).
+# sheared packings of 200 rods whose contacts resist rolling it is .39 to .78 (seeds 20 to 22, 30, 40, 44, 45), and
+# without it 1.
 ROLLING = 0.8
 QUIET = 0.1  # gap of the given model below which nothing else is looked for
 # Weight of torque equations: moments that no contact force exerts, of a base or of flattened contacts, then hardly hide
