@@ -133,9 +133,10 @@ def losses(evidence: Evidence) -> dict[str, float]:
 
 
 def _known_fraction(evidence: Evidence) -> float:
-    """Fraction of the bound that is left of a frame whose gaps are wider than those of any fitted one."""
-    gap_error = MEASURES["gap_error"](evidence)
-    return WIDEST / gap_error if gap_error > WIDEST else 1.0
+    """Fraction of the bound that is left where gaps, without overlaps by the forces, are wider than any fitted."""
+    found = evidence.information
+    unexplained = min(found.gap_error, found.unexplained_gap) / found.diameter
+    return WIDEST / unexplained if unexplained > WIDEST else 1.0
 
 
 def _bound(score: float, evidence: Evidence) -> float:

@@ -7,6 +7,7 @@ members agree, and nothing contradicts them.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from ..detection.displacement import displacement_scale
 
 DETECTABLE = 3.0  # standard deviations of a measured sliding beyond which it is detected
 STRONG = 0.5  # of the mean force: contacts that surely touch
+FEWEST_STRONG = 10  # of them, whose gaps are compared
 ROBUST = 1.4826  # standard deviation over the median absolute deviation of a Gaussian
 
 
@@ -36,6 +38,7 @@ class MotionInformation:
     diameter: float  # [m] mean
     beyond: int  # grains beyond a wall, which touch nothing there
     soft: bool = False  # gaps are overlaps that forces make
+    unexplained_gap: float = np.nan  # [m] gap_error without the overlaps that are proportional to the forces
 
 
 NO_INFORMATION = MotionInformation(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0)
@@ -79,10 +82,12 @@ def measure_motion_information(
         slide_sd = noise * np.where(contacts.with_wall[bearing], 2.0, 8.0**0.5)
         sliding = float((slid > DETECTABLE * slide_sd).mean())
         signal = float(np.sqrt(max(np.mean(slid**2) / np.mean(slide_sd**2) - 1.0, 0.0)))
+    strong = _strong_gaps(contacts, fn)
+    gap_error = _beyond_noise(strong.gap, strong, noise)
     return MotionInformation(
-        noise, motion_scale(motion, noise), sliding, signal, _gap_error(contacts, fn, noise),
-        2.0 * float(grains.radius.mean()),
+        noise, motion_scale(motion, noise), sliding, signal, gap_error, 2.0 * float(grains.radius.mean()),
         _count_beyond(packing.walls_of(snapshot), snapshot.position[snapshot.present]), soft,
+        _beyond_noise(_without_overlap(strong), strong, noise) if soft else gap_error,
     )  # fmt: skip
 
 
@@ -95,15 +100,36 @@ def motion_scale(motion: FrameMotion, noise: float) -> float:
     return displacement_scale(after - motion.interval * moving.velocity, after, np.full(len(after), noise))
 
 
-def _gap_error(contacts: Contacts, fn: Array, noise: float) -> float:
-    """Robust standard deviation of the gaps of strong contacts [m], noise subtracted."""
+class _StrongGaps(NamedTuple):
+    """Gaps of contacts that surely touch (m,) [m], their normal forces [N], and which are with a wall."""
+
+    gap: Array
+    fn: Array
+    with_wall: NDArray[np.bool_]
+
+
+def _strong_gaps(contacts: Contacts, fn: Array) -> _StrongGaps:
     bearing = fn > 0.0
     strong = fn > STRONG * fn[bearing].mean() if bearing.any() else bearing
-    if strong.sum() < 10:
+    return _StrongGaps(contacts.gap[strong], fn[strong], contacts.with_wall[strong])
+
+
+def _without_overlap(strong: _StrongGaps) -> Array:
+    """Gaps (m,) [m] without the overlap that grows with the normal force, by least squares."""
+    if len(strong.gap) < FEWEST_STRONG:
+        return strong.gap
+    relative = strong.fn - strong.fn.mean()
+    known = np.isfinite(strong.gap)
+    slope = float(relative[known] @ strong.gap[known]) / max(float(relative[known] @ relative[known]), 1e-300)
+    return strong.gap - min(slope, 0.0) * relative  # a greater force opens no gap
+
+
+def _beyond_noise(gap: Array, strong: _StrongGaps, noise: float) -> float:
+    """Robust standard deviation of the gaps of strong contacts [m], noise subtracted."""
+    if len(gap) < FEWEST_STRONG:
         return np.nan
-    gap = contacts.gap[strong]
     variance = (ROBUST * np.median(np.abs(gap - np.median(gap)))) ** 2
-    expected = noise**2 * np.where(contacts.with_wall[strong], 1.0, 2.0).mean()
+    expected = noise**2 * np.where(strong.with_wall, 1.0, 2.0).mean()
     return float(np.sqrt(max(variance - expected, 0.0)))
 
 

@@ -102,3 +102,6 @@ def test_the_bound_falls_with_gaps_wider_than_any_that_was_fitted():
     assert bound_correlation(with_gaps(2.0 * WIDEST)) == pytest.approx(0.5 * bound_correlation(widest))
     assert losses(with_gaps(4.0 * WIDEST))["gap_error"] > 0.5 * bound_correlation(widest)
     assert bound_correlation(with_gaps(math.nan)) > 0.0
+    wide = with_gaps(2.0 * WIDEST)
+    overlaps = replace(wide.information, unexplained_gap=0.5 * WIDEST * wide.information.diameter)
+    assert bound_correlation(replace(wide, information=overlaps)) == pytest.approx(bound_correlation(widest))

@@ -33,11 +33,13 @@ def rolling(snapshot, distance: float) -> FrameMotion:
     return replace(still, interval=INTERVAL, grains=replace(still.grains, spin=spin), ends_here=True)
 
 
-def measure(lattice, motion: FrameMotion, contacts: Contacts | None = None, fn=None) -> MotionInformation:
+def measure(
+    lattice, motion: FrameMotion, contacts: Contacts | None = None, fn=None, *, soft: bool = False
+) -> MotionInformation:
     packing, snapshot, walls, known = lattice
     contacts = known if contacts is None else contacts
     fn = np.ones(contacts.count) if fn is None else fn
-    return measure_motion_information(packing, snapshot, motion, contacts, fn, walls, soft=False)
+    return measure_motion_information(packing, snapshot, motion, contacts, fn, walls, soft=soft)
 
 
 def test_sliding_counts_beyond_three_standard_deviations_of_its_noise(lattice):
@@ -70,6 +72,21 @@ def test_the_error_of_gaps_is_that_of_strong_contacts_without_noise(lattice):
     assert found.gap_error == pytest.approx(error, rel=0.1)
     exact = replace(contacts, gap=rng.normal(0.0, 0.5 * noise))
     assert measure(lattice, rolling(snapshot, 0.0), exact, fn).gap_error == 0.0
+
+
+def test_overlaps_by_the_forces_of_soft_grains_are_explained(lattice):
+    _, snapshot, _, contacts = lattice
+    rng, error, compliance = np.random.default_rng(4), 2e-5, 1e-4
+    fn = rng.uniform(1.0, 3.0, contacts.count)
+    noise = NOISE * np.where(contacts.with_wall, 1.0, np.sqrt(2.0))
+    gap = rng.normal(0.0, np.hypot(noise, error)) - compliance * fn
+    still, seen = rolling(snapshot, 0.0), replace(contacts, gap=gap)
+    found = measure(lattice, still, seen, fn, soft=True)
+    assert found.gap_error > 2.0 * error
+    assert found.unexplained_gap == pytest.approx(error, rel=0.15)
+    assert measure(lattice, still, seen, fn).unexplained_gap == found.gap_error  # hard grains have no such overlaps
+    opened = measure(lattice, still, replace(contacts, gap=gap + 2.0 * compliance * fn), fn, soft=True)
+    assert opened.unexplained_gap == opened.gap_error  # forces open no gaps
 
 
 def test_displacements_are_those_of_the_whole_interval(lattice):
