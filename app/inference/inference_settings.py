@@ -28,6 +28,11 @@ class InferenceSettings:
     coordination: float | None = None  # target of z without rattlers, reached by an equal change of all radii
     overlap: float | None = None  # [m] of touching surfaces; None: 3e-4 mean diameters, or as measured from the gaps
 
+    @property
+    def radii_are_known(self) -> bool:
+        """Whether the radii are exact, and give the pixel size; not without calibration."""
+        return self.calibration is not None and self.calibration.radii_are_known
+
     def overlap_of(self, radius: Array) -> float:
         """Overlap of touching surfaces [m] for grains of these radii (n,) [m]."""
         return typical_overlap(radius) if self.overlap is None else self.overlap

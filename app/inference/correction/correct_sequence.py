@@ -68,8 +68,9 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         tracks, remarks[5] = use_size_classes(material, tracks)
     if settings.boundary is not None:
         if settings.boundary.camera:
-            known = settings.calibration is not None and settings.calibration.radii_are_known
-            tracks, walls, remarks[2], lens = correct_camera(material, tracks, walls, failed, radii_known=known)
+            tracks, walls, remarks[2], lens = correct_camera(
+                material, tracks, walls, failed, radii_known=settings.radii_are_known
+            )
         if settings.sequence.measure_precision:
             tracks, remarks[3] = measure_noise(tracks, walls)
         tracks, walls, boundary = correct_walls(settings.boundary, tracks, walls)

@@ -14,11 +14,12 @@ from .causes import finding
 
 def undistorted(inputs: Inputs, walls: WallTracks, failed: Collection[int]) -> tuple[Tracks, WallTracks, list[Finding]]:
     """Return tracks and walls as a run corrects them for the camera, and what it corrects."""
-    boundary, calibration = inputs.settings.boundary, inputs.settings.calibration
-    if boundary is None or not boundary.camera or not walls.count:
+    settings = inputs.settings
+    if settings.boundary is None or not settings.boundary.camera or not walls.count:
         return inputs.tracks, walls, []
-    known = calibration is not None and calibration.radii_are_known
-    tracks, walls, _, found = correct_camera(inputs.material, inputs.tracks, walls, failed, radii_known=known)
+    tracks, walls, _, found = correct_camera(
+        inputs.material, inputs.tracks, walls, failed, radii_known=settings.radii_are_known
+    )
     return tracks, walls, [] if found is None else [_name(found)]
 
 

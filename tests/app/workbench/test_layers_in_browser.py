@@ -21,16 +21,21 @@ LEGENDS = 200  # [px] to their right
 BOX = [-8, 416, 236, 606]  # [px] of the photograph around the walls of the stored run
 
 
+def inspect(tab: Page) -> None:
+    """Show the stored frame in the step Inspect, with its walls in view."""
+    go(tab, "inspect")
+    tab.evaluate(f"workbench.show({FRAME})")
+    idle(tab)
+    tab.wait_for_function("workbench.step.isLoaded(workbench)")
+    tab.evaluate(f"workbench.stage.fit({BOX})")
+
+
 @pytest.fixture
 def tab(page: Page, solved: Path) -> Iterator[Page]:
     with opened(page, solved) as tab:
         tab.locator(".tile").first.click()
         idle(tab)
-        go(tab, "inspect")
-        tab.evaluate(f"workbench.show({FRAME})")
-        idle(tab)
-        tab.wait_for_function("workbench.step.isLoaded(workbench)")
-        tab.evaluate(f"workbench.stage.fit({BOX})")
+        inspect(tab)
         yield tab
 
 
@@ -211,11 +216,7 @@ def test_values_by_fringes_are_offered_and_drawn_only_where_the_run_has_them(tab
     save_results(file, with_fringes(load_results(file)), origin_of(file))
     tab.reload()
     idle(tab)
-    go(tab, "inspect")
-    tab.evaluate(f"workbench.show({FRAME})")
-    idle(tab)
-    tab.wait_for_function("workbench.step.isLoaded(workbench)")
-    tab.evaluate(f"workbench.stage.fit({BOX})")
+    inspect(tab)
     by_fringes, by_forces = (shown(tab, strain={**fringed, "by": name}) for name in ("fringes", "residual"))
     assert drawn(by_fringes) > 0.002
     assert not np.array_equal(by_fringes, by_forces)
