@@ -11,7 +11,7 @@ from rodsight.inference.diagnosis.distortion import undistorted
 from rodsight.inference.inference_settings import InferenceSettings
 from rodsight.inference.inputs import Inputs
 from rodsight.solver.bodies.rods import RodMaterial
-from rodsight.solver.bodies.wall_shapes import circle_parameters
+from rodsight.solver.bodies.wall_shapes import circle_parameters, outward_normals
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
 from tests.golden.forces import NOISE, STORED
@@ -95,6 +95,14 @@ def test_walls_seen_through_the_lens_are_corrected(given) -> None:
     assert "a radial distortion" in sentence
     before, after = (np.abs(distances(*each) - distances(*given)) for each in (seen, (corrected, moved)))
     assert np.median(after) < 0.2 * np.median(before)
+
+
+def test_walls_in_a_distorted_picture_are_moved_to_the_rods_that_touch_them(given) -> None:
+    tracks, walls = given
+    off = walls.endpoints - 2 * NEAR * outward_normals(walls.endpoints)[:, :, None]  # a bar's line is read too far in
+    seen = replace(tracks, position=stretched(tracks.position)), replace(walls, endpoints=stretched(off))
+    corrected, moved, _, _ = correct_camera(MATERIAL, *seen, (), radii_known=True)
+    assert np.abs(distances(corrected, moved) - distances(*given)).max() < NEAR
 
 
 def test_a_circle_keeps_its_shape(given) -> None:
