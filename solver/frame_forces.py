@@ -16,6 +16,7 @@ from .quantity import Quantity
 
 NAN = float("nan")
 ERROR_PARTS = ("positions", "radii", "friction", "contacts", "steps", "method")  # of an error budget
+MEMBERS = ("soft", "stiff", "last", "ahead", "around", "wide", "steady")  # of the ensemble: 2 chains, 5 convex programs
 
 
 class FrameStatus(IntEnum):

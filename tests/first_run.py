@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import compileall
 import json
 import os
 import subprocess
@@ -65,9 +66,10 @@ def build_wheel(folder: Path, *levels: str) -> Path:
 
 
 def unpack_wheel(wheel: Path, folder: Path) -> Path:
-    """Install a wheel into a folder that the search path can name."""
+    """Install a wheel into a folder that the search path can name, with byte code as pip writes it."""
     with zipfile.ZipFile(wheel) as content:
         content.extractall(folder)
+    compileall.compile_dir(folder, quiet=2)
     return folder
 
 

@@ -5,6 +5,7 @@ Exit status: 0 done, 1 failed, 2 bad input, 130 interrupted (143 terminated, 129
 
 from __future__ import annotations
 
+import gc
 import io
 import os
 import sys
@@ -18,11 +19,14 @@ SHELLS = ("bash", "zsh", "tcsh")
 # Of linear algebra, read where it is loaded; `process.machine.linear_algebra` states why one thread, and limits callers
 # that have loaded it before.
 THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+# New objects until cycles are looked for (Python: 700). Modules make a million objects, all of which stay.
+NEW_OBJECTS = 50_000
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Parse the arguments, run one command, exit."""
     arguments = sys.argv[1:] if arguments is None else arguments
+    gc.set_threshold(NEW_OBJECTS)
     for name in THREADS:
         os.environ.setdefault(name, "1")
     for stream in (sys.stdout, sys.stderr):  # unknown characters are replaced

@@ -20,13 +20,12 @@ from ..solver.boundary.camera_distortion import TERMS, CameraDistortion
 from ..solver.calibration.calibrate import Calibration
 from ..solver.contacts.radius_tuning import RadiusTuning
 from ..solver.convex.friction_check import FrictionCheck
-from ..solver.frame_forces import ERROR_PARTS, FrameForces
+from ..solver.frame_forces import ERROR_PARTS, MEMBERS, FrameForces
 from ..solver.kinematics.mean_field import FLUCTUATION_EDGES
 from ..solver.kinematics.sequence_kinematics import SequenceKinematics
 from ..solver.kinematics.spatial_correlation import DISTANCE_EDGES
 from ..solver.nlgs.start_residuals import COLD_SWEEPS
 from ..solver.quantity import DeclaredField, Quantity, quantities
-from ..solver.sequence.ensemble import MEMBERS
 from ..solver.statistics.force_statistics import FORCE_EDGES, MOBILISATION_EDGES
 from ..solver.statistics.frame_statistics import FrameStatistics
 from ..tracks import Tracks, WallTracks

@@ -25,6 +25,7 @@ from ..convex.friction_estimate import relative_power_gap
 from ..convex.program import Balance, ConvexForces, LoadScale, assemble_balance, project_onto_equilibrium
 from ..detection.contact_networks import PairProbability, ProbabilityNetwork
 from ..detection.displacement import member_intervals
+from ..frame_forces import MEMBERS
 from ..nlgs.chain import ChainStep, advance_chain_through, force_scale
 from ..nlgs.force_memory import ForceMemory
 from ..nlgs.interval import Interval
@@ -71,7 +72,6 @@ class EnsembleState:
 
 
 AGREEING_FRAMES = 3  # with H below its level: it only falls until the forces are reset
-MEMBERS = ("soft", "stiff", "last", "ahead", "around", "wide", "steady")  # two chains, five convex programmes
 CHAINS = 2  # of the MEMBERS, the first
 
 Task = Callable[[], Any]  # one member: a ChainStep, or forces with their memory

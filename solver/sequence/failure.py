@@ -15,12 +15,11 @@ import numpy as np
 from ..bodies.grains import Array
 from ..bodies.motion import Snapshot
 from ..contacts.contacts import Contacts
-from ..frame_forces import FrameForces, FrameStatus
+from ..frame_forces import MEMBERS, FrameForces, FrameStatus
 from ..nlgs.force_memory import ForceMemory
 from ..nlgs.start_residuals import COLD_SWEEPS
 from ..nlgs.sweep_record import SweepHistory
 from ..quantity import columns, quantities
-from .ensemble import MEMBERS
 from .state import NO_EVIDENCE, SequenceState
 
 FEWEST_SEEN = 0.1  # fraction of all tracked grains below which a frame is unusable

@@ -21,7 +21,7 @@ from ... import __version__
 from ...process.atomic import replacing
 from ...process.errors import InputError
 from ...process.frame_range import FrameRange
-from ...solver.sequence.ensemble import MEMBERS
+from ...solver.frame_forces import MEMBERS
 from ...tracks import Tracks, WallTracks
 from ..finding import Finding
 from ..manifest import MANIFEST, Manifest

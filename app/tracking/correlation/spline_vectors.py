@@ -15,7 +15,6 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
-from scipy.interpolate import BSpline
 
 from ...solver.bodies.grains import Array
 from . import interpolation
@@ -29,6 +28,8 @@ PLACE, PROJECTED = 2, 4
 
 def weight_polynomials(degree: int, first: int, lanes: int) -> Array:
     """Coefficients (degree + 1, lanes) of the powers of 0 ≤ t < 1 in the weights of the taps first, first + 1, …"""
+    from scipy.interpolate import BSpline  # slow to import, and compiled readers do not need it
+
     spline = BSpline.basis_element(np.arange(degree + 2) - 0.5 * (degree + 1), extrapolate=False)
     t = np.linspace(0.0, 1.0, degree + 1)
     weight = np.nan_to_num(spline(t[:, None] - (first + np.arange(lanes))))
@@ -43,7 +44,6 @@ def _spline_reader(degree: int, lanes: int):
     taps = degree + 1
     padding = (lanes - taps) // 2
     before = degree // 2  # rows and columns of taps before the point's own
-    polynomials = weight_polynomials(degree, -before - padding, lanes)
     vector = ir.VectorType(SINGLE, lanes)
 
     @intrinsic
@@ -51,6 +51,7 @@ def _spline_reader(degree: int, lanes: int):
         signature = types.float32(coefficients, types.intp, types.intp, types.float32, types.float32)
 
         def build(context, builder, signature, arguments):
+            polynomials = weight_polynomials(degree, -before - padding, lanes)
             photograph, column, row, part_x, part_y = arguments
             array = context.make_array(signature.args[0])(context, builder, photograph)
             stride = builder.extract_value(array.strides, 0)

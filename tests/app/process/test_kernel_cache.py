@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import platform
 import shutil
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rodsight.process import kernel_cache
 from rodsight.process.kernel_cache import (
@@ -21,7 +23,8 @@ from rodsight.process.kernel_cache import (
     kernel_key,
     remove_old,
 )
-from rodsight.process.machine.processor import V3, V4, level_of
+from rodsight.process.machine import processor
+from rodsight.process.machine.processor import V3, V4, level_of, processor_level
 from rodsight.process.sources import Sources
 
 from tests.program import ROOT
@@ -36,6 +39,14 @@ from rodsight.solver.nlgs.solve import NlgsSettings, solve
 problem, _ = problem_of(*squeezed_heap(np.random.default_rng(1)))
 print(solve(problem, NlgsSettings(sweeps=50)).ft.tobytes().hex())
 """
+# /proc/cpuinfo of a processor for which no wheel has kernels; a program that takes this processor for such a one.
+ARM = "processor\t: 0\nFeatures\t: fp asimd evtstrm aes\nCPU implementer\t: 0x41\nCPU part\t: 0xd0c"
+ON_ARM = """
+import platform
+platform.machine = lambda: "aarch64"
+from rodsight.process.kernel_cache import kernel_folder
+"""
+KERNELS_OF = "\nprint(*{each.name for each in kernel_folder().rglob('*.nbi')})"
 
 
 @pytest.fixture
@@ -188,6 +199,19 @@ def test_kernels_of_other_sources_than_the_installed_ones_are_not_used(shipped, 
     assert not unpacked().exists()
 
 
+def test_a_processor_without_kernels_in_the_wheel_gets_none_of_another_and_no_level(shipped, monkeypatch):
+    choose_kernel_cache()
+    assert unpacked().exists()  # on this processor
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(shipped.parent / "other"))
+    monkeypatch.delenv(NAME_VARIABLE)
+    monkeypatch.setattr(platform, "machine", lambda: "aarch64")
+    monkeypatch.setattr(processor, "_first_processor", lambda: ARM)
+    assert processor_level() is None
+    choose_kernel_cache()
+    assert not unpacked().exists()
+    assert NAME_VARIABLE not in os.environ
+
+
 def test_the_folder_of_kernels_has_the_name_that_the_compiler_gives_it():
     from numba.core.caching import CacheImpl
     from rodsight.solver.nlgs.sweeping import kernels
@@ -212,3 +236,22 @@ def test_half_the_coulomb_limit_in_a_helper_changes_the_forces_and_its_reversal_
     assert forces() != first
     edit(tree, HELPER, HALF, CONE)
     assert forces() == first
+
+
+@pytest.mark.slow
+def test_a_processor_of_no_level_compiles_for_itself_and_finds_the_same_forces(tmp_path):
+    hidden = ("NUMBA_CACHE_DIR", NAME_VARIABLE, "NUMBA_CPU_FEATURES")
+    environment = {name: value for name, value in os.environ.items() if name not in hidden}
+    environment |= {
+        "PYTHONPATH": os.pathsep.join((str(ROOT / ".editable"), str(ROOT))),
+        "XDG_CACHE_HOME": str(tmp_path),
+    }
+
+    def lines(code: str) -> list[str]:
+        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        return done.stdout.splitlines()
+
+    forces, kernels = lines(ON_ARM + FORCES + KERNELS_OF)
+    assert kernels
+    (expected,) = lines(FORCES)
+    np.testing.assert_allclose(*(np.frombuffer(bytes.fromhex(each)) for each in (forces, expected)), rtol=1e-9)

@@ -17,12 +17,11 @@ from rodsight.solver.calibration.calibrate import Calibration
 from rodsight.solver.calibration.gap_statistics import GapStatistics
 from rodsight.solver.calibration.priors import CalibrationPriors
 from rodsight.solver.convex.friction_check import FrictionCheck
-from rodsight.solver.frame_forces import ERROR_PARTS, FrameForces
+from rodsight.solver.frame_forces import ERROR_PARTS, MEMBERS, FrameForces
 from rodsight.solver.kinematics.mean_field import FLUCTUATION_BINS
 from rodsight.solver.kinematics.sequence_kinematics import SequenceKinematics
 from rodsight.solver.kinematics.spatial_correlation import DISTANCE_BINS
 from rodsight.solver.nlgs.start_residuals import COLD_SWEEPS
-from rodsight.solver.sequence.ensemble import MEMBERS
 
 from tests.app.recording.fake_results import make_results, make_tuning
 

@@ -21,9 +21,8 @@ from rodsight.results.hdf5.store import (
 )
 from rodsight.results.results import Results
 from rodsight.solver.contacts.contacts import ContactSource, ContactState
-from rodsight.solver.frame_forces import FrameForces, FrameStatus
+from rodsight.solver.frame_forces import MEMBERS, FrameForces, FrameStatus
 from rodsight.solver.quantity import columns
-from rodsight.solver.sequence.ensemble import MEMBERS
 
 from tests.app.recording.fake_results import make_results
 from tests.app.results.differences import differences
