@@ -145,10 +145,15 @@ def expected_rods(tracks: Tracks) -> int:
     here = tracks.present[0]
     if np.count_nonzero(here) < FEWEST_ENCLOSING:
         return int(here.sum())
+    area = enclosed_area(tracks.position[0, here], tracks.radius[here])
+    return round(SOLID_FRACTION * area / float(np.mean(np.pi * tracks.radius[here] ** 2)))
+
+
+def enclosed_area(position: Array, radius: Array) -> float:
+    """Return the area of the convex hull of circles, from centres (n, 2) and radii (n,) in one unit of length."""
     angle = np.linspace(0.0, 2.0 * np.pi, RIM_POINTS, endpoint=False)
-    rim = tracks.radius[here, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    hull = ConvexHull((tracks.position[0, here, None] + rim).reshape(-1, 2))
-    return round(SOLID_FRACTION * hull.volume / float(np.mean(np.pi * tracks.radius[here] ** 2)))  # volume: area in 2D
+    rim = radius[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return float(ConvexHull((position[:, None] + rim).reshape(-1, 2)).volume)  # an area in the plane
 
 
 def open_sides(walls: WallTracks) -> list[str]:

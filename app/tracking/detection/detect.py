@@ -24,7 +24,7 @@ from .circle_measurement import CIRCLES_PER_THREAD, CircleMeasurer, MeasuredCirc
 from .discs import OVERLAP, Discs, find_discs
 from .rings import Circles, find_circles, without_overlap
 
-# Greatest error of a ring's centre [px], besides the difference of two classes' radii.
+# Least half width of the search for the edges of a ring [px], whose centre has an error of that size or larger.
 RING_UNCERTAINTY = 3.0
 # Greatest error of a small circle's centre, as a fraction of its radius.
 SMALL_FRACTION = 0.2
@@ -267,7 +267,7 @@ def _measure(
 ) -> Array:
     """Measure x, y, radius, quality (c, 4) of some of the rough circles."""
     size = rough.radius[rows]
-    window = np.array([_window(each, known) for each in size])
+    window = np.maximum([_window(each, known) for each in size], rough.error[rows])
     radius_sd = 0.3 if known else np.inf
     found = measurer.measure(_rough(rough.x[rows], rough.y[rows], size, window, radius_sd))
     if not known:
@@ -289,9 +289,10 @@ def _rough(x: Array, y: Array, radius: Array, window: Array, radius_sd: float) -
 def _best_of_every_radius(rough: Circles, tree: KDTree, k: int) -> NDArray[np.intp]:
     """The candidate with the highest score of every radius around candidate k."""
     widest = float(rough.radius.max() - rough.radius.min())
-    near = np.sort(np.asarray(tree.query_ball_point([rough.x[k], rough.y[k]], widest + RING_UNCERTAINTY)))
+    error = max(RING_UNCERTAINTY, float(rough.error[k]))  # besides the difference of two classes' radii
+    near = np.sort(np.asarray(tree.query_ball_point([rough.x[k], rough.y[k]], widest + error)))
     distance = np.hypot(rough.x[near] - rough.x[k], rough.y[near] - rough.y[k])
-    near = near[distance <= np.abs(rough.radius[near] - rough.radius[k]) + RING_UNCERTAINTY]
+    near = near[distance <= np.abs(rough.radius[near] - rough.radius[k]) + error]
     # Candidates are in the order of their score: the first of every radius is its best.
     _, first = np.unique(rough.radius[near], return_index=True)
     return near[np.sort(first)]

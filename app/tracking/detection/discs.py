@@ -60,7 +60,7 @@ def find_discs(level: Image, found: Array, smallest: float) -> Discs:
     )
     least = factor * smallest
     if not _may_hold_disc(bright, least):
-        return Discs(Circles(*np.empty((4, 0))), 0.0, 0.0, np.inf)
+        return Discs(Circles(*np.empty((5, 0))), 0.0, 0.0, np.inf)
     # The distance between the centres of a pixel and the nearest dark one exceeds that to the edge by half a pixel.
     distance = cv2.distanceTransform(bright, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     inner = (distance >= least + 0.5).view(np.uint8)
@@ -80,7 +80,7 @@ def find_discs(level: Image, found: Array, smallest: float) -> Discs:
     _paint_discs(bright, column, row, radius, 2)
     covered = int(np.count_nonzero(wide & (bright == 2)))
     place = [(axis + 0.5) / factor - 0.5 for axis in (column, row)]
-    candidates = Circles(place[0], place[1], radius / factor, np.ones(len(radius)))
+    candidates = Circles(place[0], place[1], radius / factor, *np.ones((2, len(radius))))
     return Discs(candidates, area / factor**2, covered / max(area, 1), light_range)
 
 

@@ -16,6 +16,7 @@ from ..correlation.splines import shrink
 # the second.
 MIN_COARSE_RADIUS = 10.0
 COARSE_RADIUS = 20.0
+PEAK_ERROR = 1.5  # greatest error of a circle's centre [px of the shrunk photograph]
 
 # Greatest radius [px] that sets the size of the tiles of local contrast: uneven light does not scale with the grains.
 LARGEST_LOCAL = 80.0
@@ -29,6 +30,7 @@ class Circles:
     y: Array  # (c,) [px]
     radius: Array  # (c,) [px]
     score: Array  # (c,) mean inward slope along the circle, as a fraction of a full edge's
+    error: Array  # (c,) [px] greatest error of the centre
 
 
 def find_circles(image: Image, radii: Array, *, min_score: float) -> Circles:
@@ -48,7 +50,7 @@ def find_circles(image: Image, radii: Array, *, min_score: float) -> Circles:
     """
     radii = radii[2.0 * radii < max(image.shape)]
     if len(radii) == 0:
-        return Circles(*np.empty((4, 0)))
+        return Circles(*np.empty((5, 0)))
     least = max(int(radii.min() / MIN_COARSE_RADIUS), 1)
     factors = np.maximum((radii / COARSE_RADIUS).astype(np.intp), least)
     found = []
@@ -59,11 +61,12 @@ def find_circles(image: Image, radii: Array, *, min_score: float) -> Circles:
             peak = (score == cv2.dilate(score, np.ones((5, 5), np.uint8))) & (score > min_score)
             row, column = np.nonzero(peak)
             place = [axis * factor + 0.5 * (factor - 1) for axis in (column, row)]
-            found.append(np.stack([*place, np.full(len(row), radius), score[peak]], axis=1))
+            error = PEAK_ERROR * factor
+            found.append(np.stack([*place, *np.broadcast_arrays(radius, score[peak], error)], axis=1))
     table = np.concatenate(found)
     # A mean over a longer circle is more significant at the same value.
     table = table[np.argsort(-table[:, 3] * np.sqrt(table[:, 2]), kind="stable")]
-    return Circles(table[:, 0], table[:, 1], table[:, 2], table[:, 3])
+    return Circles(*table.T)
 
 
 def without_overlap(x: Array, y: Array, radius: Array, *, allowed: float) -> np.ndarray:

@@ -1,6 +1,6 @@
 // The open experiment, the step that is shown, and the keys that work in every step. All data are on the server.
 
-import { context, request, at, digits, h, sign, notify } from "/page/dom.js";
+import { context, request, at, digits, dismissRefusal, h, sign, notify } from "/page/dom.js";
 import { Stage } from "/page/stage.js";
 import { showHome } from "/page/home.js";
 import { showLayers, toggleLayers } from "/page/layers/panel.js";
@@ -78,6 +78,7 @@ function showRefused() {
 /** Change the open experiment; the answer is its new state. */
 app.change = (endpoint, values = {}, words = "", then = null) => app.queue(async () => {
   const answer = await request(endpoint, { at: app.project.at, ...values });
+  dismissRefusal();
   app.take(answer);
   then?.(answer);
 }, words, endpoint === "undo" || endpoint === "redo" ? null : endpoint + JSON.stringify(values));
@@ -139,7 +140,7 @@ app.edits = (step = app.step) => (step.edits === undefined ? null : Math.min(ste
 
 app.go = (step) => {
   app.step.leave?.(app);
-  app.refused = null;
+  app.refused = null; dismissRefusal();
   if (app.edits() === null) app.looked = app.frame;
   app.step = step;
   app.frame = app.edits() ?? Math.min(app.looked ?? 0, Math.max(app.project.frames - 1, 0));

@@ -41,6 +41,9 @@ export function notify(text, wrong = false) {
   timer = setTimeout(() => { at("toast").className = ""; }, wrong ? 7000 : 2600);
 }
 
+/** Take a refusal away that no longer holds. */
+export function dismissRefusal() { if (at("toast").classList.contains("wrong")) at("toast").className = ""; }
+
 export const SIGNS = { good: "✓", doubtful: "!", missing: "○" };
 export const sign = (mark) => h("span", { class: `sign ${mark}`, title: mark, role: "img", "aria-label": mark }, SIGNS[mark] ?? "");
 

@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field, StringConstraints
 
 from ...experiment.experiment import GrainGuess
 from ...process.errors import InputError
+from ...tracking.detection.clicked_circle import fit_clicked
 from ..setup import circles, edits, initialise, photograph_series
 from ..setup.validation import ValidationResult, outside_walls
 from .endpoints import Line, Number, Numbers, Point, Text, Values, Whole, editing_endpoint, endpoint, without_nul
@@ -156,10 +157,9 @@ def set_table(
 def measure_rod(workbench: Workbench, at: Text, x: Number, y: Number, radius: Number) -> dict[str, Any]:
     """Fit the circle of a rod near a drawn one."""
     opened = workbench.project(at)
-    free = ValidationResult(opened.validation().steps, {})
-    image = opened.photograph(0)
-    x, y, radius = edits.fit_rod(image, free, x, y, min(max(radius, 3.0), float(max(image.shape))))
-    return {"x": x, "y": y, "r": radius}
+    fitted = fit_clicked(opened.photograph(0), (x, y, max(radius, 3.0)))
+    x, y, radius = fitted or (x, y, radius)
+    return {"x": x, "y": y, "r": radius, "seen": fitted is not None}
 
 
 @editing_endpoint

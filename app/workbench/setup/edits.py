@@ -20,7 +20,9 @@ from ...experiment.walls import FORCE_COLUMNS, LOAD_COLUMNS, WALL_COLUMNS
 from ...process.errors import InputError
 from ...solver.bodies.grains import Array
 from ...solver.bodies.wall_shapes import STRAIGHT
-from ...tracking.detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
+from ...tracking.detection.clicked_circle import fit_clicked
+from ...tracking.detection.detect import Detection, DetectionSettings, detect_grains
+from ...tracking.detection.scale_comparison import find_other_scale, packed_fraction
 from ...tracking.walls.inner_edge import depth_in_circles, find_bars, lines_to_corners, snap_to_edge
 from .circles import arcs_table, circles_of, moved_corners, renamed
 from .draft import Draft, as_table
@@ -34,12 +36,7 @@ TABLES: dict[str, tuple[str, str, Sequence[str], Sequence[str]]] = {
 }
 GRAINS, WALLS, CORRECTIONS = "grains.csv", "walls.csv", "corrections.csv"
 GRAIN_COLUMNS = ("id", "x", "y", "radius")
-AROUND = 3.0  # [radii] about a clicked rod in which its rim is searched
 OVERLAP = 0.15  # [radii] that a rod added by hand may overlap others: clicks and fits have errors
-FEW = 4  # rods: fewer are no packing
-FACTORS = (10.0, 0.1, 2.0, 0.5, 1000.0, 0.001)  # by which a scale or its unit is mistaken
-CLEAR = 0.5  # fraction of an outline that is seen
-LEAST_RADIUS = 3.0  # [px] of a rod
 TOUCHES = 0.08  # radii between the edge of a bar and the rod next to it; else it is another edge
 SEEN = 0.34  # fraction of the profiles across a line that must show the edge
 NAMES = ("bottom", "right", "top", "left")
@@ -261,29 +258,26 @@ def detect(
     except ValueError as error:
         if radius_range is not None:
             raise InputError("--radius-range", "{:g}:{:g}".format(*radius_range), str(error)) from None
-        _compare_scales(image, classes, 0)
+        _compare_scales(image, classes, None)
         raise InputError("photographs.radii", str(list(radii)), str(error)) from None
     detection = detect_grains(image, settings)
-    if detection.count < FEW and classes:
-        _compare_scales(image, classes, detection.count)
+    if classes:
+        _compare_scales(image, classes, detection)
     return _within_walls(detection, found)
 
 
-def _compare_scales(image: Image, classes: Sequence[float], count: int) -> None:
+def _compare_scales(image: Image, classes: Sequence[float], found: Detection | None) -> None:
     """Raise InputError where rods of these classes (radii in pixels) are seen at a scale that differs by a factor."""
-    for factor in FACTORS:
-        sizes = tuple(radius * factor for radius in classes)
-        if min(sizes) < LEAST_RADIUS or max(sizes) > 0.25 * min(image.shape):
-            continue
-        seen = detect_grains(image, DetectionSettings(sizes))
-        clear = int((seen.quality > CLEAR).sum())
-        if clear >= max(FEW, 3 * count):
-            word = "large" if factor > 1.0 else "small"
-            raise InputError(
-                "scale", "", f"looks {max(factor, 1.0 / factor):g} times too {word}: at this scale {count} rods of the "
-                f"known radii are seen, at {1.0 / factor:g} times it {clear}. Look at step Scale, and at the unit of "
-                "the radii.",
-            )  # fmt: skip
+    other = find_other_scale(image, classes, found)
+    if other is None:
+        return
+    factor, seen = other
+    count, filled = (0, 0.0) if found is None else (found.count, 100.0 * packed_fraction(found))
+    raise InputError(
+        "scale", "", f"looks {max(factor, 1.0 / factor):g} times too {'large' if factor > 1.0 else 'small'}: at this "
+        f"scale {count} circles of the known radii are seen, which fill {filled:.0f} % of their area; at "
+        f"{1.0 / factor:g} times it {seen} that are packed. Look at step Scale, and at the unit of the radii.",
+    )  # fmt: skip
 
 
 def set_rods(draft: Draft, change: str, rods: GrainGuess, radii: Sequence[float] | None = None) -> None:
@@ -307,13 +301,14 @@ def fit_rod(image: Image, found: ValidationResult, x: float, y: float, radius: f
     """Fit centre and radius [px] of a rod clicked at x, y to its visible rim; unchanged where no rim is visible."""
     section = found.data.get("photographs", {})
     classes: list[float] = section.get("radii") or []
-    largest = max([radius, *(each / found.scale.mean_size for each in classes if found.scale is not None)])
-    left, top = (max(int(each - AROUND * largest), 0) for each in (x, y))
-    image = image[top : int(y + AROUND * largest) + 1, left : int(x + AROUND * largest) + 1]
-    if min(image.shape) < 2:
-        return x, y, radius
-    fitted = _fit_here(image, found, classes, (x - left, y - top, radius), _free_radius(found.rods, x, y))
-    return fitted[0] + left, fitted[1] + top, fitted[2]
+    sizes = np.array([] if found.scale is None else classes) / (1.0 if found.scale is None else found.scale.mean_size)
+    if len(sizes):
+        # A rod that detection missed has a weak rim; a circle through the rims of its neighbours may be stronger.
+        sizes = sizes[sizes <= max((1.0 + OVERLAP) * _free_radius(found.rods, x, y), sizes.min())]
+        fallback = x, y, float(sizes[np.abs(sizes - radius).argmin()])
+    else:
+        fallback = x, y, radius
+    return fit_clicked(image, (x, y, radius), sizes.tolist()) or fallback
 
 
 def _free_radius(rods: GrainGuess | None, x: float, y: float) -> float:
@@ -321,30 +316,6 @@ def _free_radius(rods: GrainGuess | None, x: float, y: float) -> float:
     if rods is None or len(rods.id) == 0:
         return np.inf
     return float((np.hypot(rods.x - x, rods.y - y) - rods.radius).min())
-
-
-def _fit_here(
-    image: Image,
-    found: ValidationResult,
-    classes: Sequence[float],
-    circle: tuple[float, float, float],
-    free_radius: float,
-) -> tuple[float, float, float]:
-    """Fit a rod in a part of the photograph; free_radius [px]: up to its nearest neighbour."""
-    x, y, radius = circle
-    if classes and found.scale is not None:
-        sizes = np.array(classes) / found.scale.mean_size
-        # A rod that detection missed has a weak rim; a circle through the rims of its neighbours may be stronger.
-        sizes = sizes[sizes <= max((1.0 + OVERLAP) * free_radius, sizes.min())]
-        tried = [refine_grains(image, np.array([x]), np.array([y]), np.array([size])) for size in sizes]
-        best = max(tried, key=lambda each: float(each.quality[0]))
-        if best.quality[0] > 0.0 and np.isfinite(best.sigma[0]):
-            return float(best.x[0]), float(best.y[0]), float(best.radius[0])
-        return x, y, float(sizes[np.abs(sizes - radius).argmin()])
-    free = refine_grains(image, np.array([x]), np.array([y]), np.array([radius]), fixed_radius=False)
-    if free.quality[0] > 0.2 and np.isfinite(free.sigma[0]) and abs(free.radius[0] / radius - 1.0) < 0.3:
-        return float(free.x[0]), float(free.y[0]), float(free.radius[0])
-    return x, y, radius
 
 
 def with_rod(rods: GrainGuess | None, name: int | None, pose: tuple[float, float, float] | None) -> GrainGuess:

@@ -49,6 +49,7 @@ MOSTLY = 0.8  # fraction of the rods beyond a wall above which the walls are wro
 UNLIKE = 1.5  # ratio of the rods' radii and the known ones above which the scale is in question
 FEW = 0.8  # of the rods that would fill the area of those found: fewer are reported
 FEW_PHOTOGRAPHS = 4
+APART = 3.0  # ratio of two successive radii above which the smaller circles may be no rods
 SUBSTITUTE = 1e-4  # [m] of a pixel, and [s] between photographs, where they are missing
 
 
@@ -266,11 +267,27 @@ def _validate_rods(found: ValidationResult, experiment: Experiment) -> None:
         check_radii(experiment, tracks)
     except InputError as error:
         found.steps["rods"].add_warning(_without_file(experiment.file, error))
+    _warn_of_small(found)
     count, expected = len(tracks.id), expected_rods(tracks)
     if count < FEW * expected:
         found.steps["rods"].add_warning(
             f"About {expected} rods fill the area of those found, but {count} are found: mark the others, or try "
             "another channel, following by outline, or a range of radii."
+        )
+
+
+def _warn_of_small(found: ValidationResult) -> None:
+    """Warn of circles that are much smaller than all others: speckles of the paint, screws."""
+    assert found.rods is not None
+    assert found.scale is not None
+    ordered = np.sort(found.rods.radius)
+    apart = np.flatnonzero(ordered[1:] > APART * ordered[:-1])
+    if len(apart):
+        count = int(apart[-1]) + 1
+        below, above = (1e3 * found.scale.mean_size * float(ordered[k]) for k in (count - 1, count))
+        found.steps["rods"].add_warning(
+            f"{count} of {len(ordered)} circles have radii up to {below:.2g} mm, the others from {above:.2g} mm: "
+            "speckles of the paint, or screws? Give the known radii, and detect again."
         )
 
 

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from rodsight.experiment.experiment import GrainGuess
+from rodsight.tracking.detection.clicked_circle import fit_clicked
 from rodsight.workbench.setup import edits
 from rodsight.workbench.setup.edits import fit_rod
 
@@ -56,3 +57,19 @@ def test_edges_that_no_rod_touches_or_that_cut_rods_are_no_walls(monkeypatch):
     lines = edits.find_walls(np.zeros((130, 150), np.float32), found)
     sides = np.array([float(np.mean(lines[w, :, 1 - w % 2])) for w in range(4)])
     assert np.abs(sides - [100.0, 120.0, 20.0, 20.0]) == pytest.approx([0.5, 0.0, 0.0, 0.5], abs=0.05)
+
+
+@pytest.mark.parametrize("enlarged", [1, 2])
+def test_a_circle_drawn_beside_its_rim_snaps_to_it_on_a_large_photograph_too(disc, enlarged):
+    large = np.kron(disc, np.ones((enlarged, enlarged), np.float32))
+    middle, radius = enlarged * (MIDDLE + 0.5) - 0.5, enlarged * LARGE
+    drawn = middle + 0.1 * radius, middle - 0.08 * radius, 0.88 * radius
+    near = 0.02 * radius  # sharp edges of whole pixels; the circle was drawn 12 % off
+    assert fit_clicked(large, drawn) == pytest.approx((middle, middle, radius), abs=near)
+    assert fit_clicked(large, drawn, [0.8 * radius, radius]) == pytest.approx((middle, middle, radius), abs=near)
+
+
+def test_where_there_is_no_rim_a_circle_stays_as_drawn_and_that_is_known(disc):
+    empty = np.full_like(disc, 40.0)
+    assert fit_clicked(empty, (MIDDLE, MIDDLE, LARGE)) is None
+    assert fit_rod(empty, validated(), MIDDLE, MIDDLE, 40.0) == (MIDDLE, MIDDLE, LARGE)  # type: ignore[arg-type]

@@ -69,6 +69,12 @@ def test_what_lies_outside_the_walls_is_dropped_at_once(walled):
     assert len(visitor.request("undo", at=at)["rods"]["id"]) == 32
 
 
+def test_circles_much_smaller_than_the_rods_are_named(walled):
+    visitor, at = walled
+    assert "2 of 32 circles have radii up to 2.2 mm" in messages(visitor.request("project", at=at), "rods")
+    assert "have radii up to" not in messages(visitor.request("drop_outside", at=at), "rods")
+
+
 @pytest.mark.parametrize(("factor", "word"), [(10.0, "large"), (0.1, "small")])
 def test_a_scale_wrong_by_ten_is_named(walled, made_photographs, factor, word):
     visitor, at = walled

@@ -113,6 +113,41 @@ def test_a_server_that_is_gone_is_a_state_of_the_page(page: Page, begun: Path):
         expect(tab.locator("#lost")).to_be_hidden()
 
 
+def test_a_refusal_is_gone_once_the_value_is_right(page: Page, begun: Path):
+    with opened(page, begun) as tab:
+        enter(tab, "photographs")
+        fill(tab, "interval", "a minute")
+        expect(tab.locator("#toast")).to_have_class("shown wrong")
+        fill(tab, "interval", "60")
+        expect(tab.locator("#toast")).to_have_class("")
+        fill(tab, "interval", "a minute")
+        go(tab, "scale")
+        expect(tab.locator("#toast")).to_have_class("")
+
+
+def test_known_rods_that_disagree_and_rims_that_are_not_seen_are_named(page: Page, begun: Path):
+    with opened(page, begun) as tab:
+        enter(tab, "scale")
+        tab.get_by_text("Known rods").click()
+        idle(tab)
+        drag(tab, (2.0, 2.0), (9.0, 2.0))  # beside the packing
+        expect(tab.locator("#toast")).to_contain_text("No rim is seen there")
+        expect(tab.locator("#panel")).to_contain_text("as drawn")
+        drag(tab, (12.0, 12.0), (26.0, 12.0))
+        fill(tab, "radius-a", "7")
+        expect(tab.locator("#disagreeing")).to_have_count(0)
+        fill(tab, "radius-b", "7")
+        expect(tab.locator("#disagreeing")).to_contain_text("The radii disagree: rod")
+
+
+def test_the_quality_is_not_awaited_where_a_photograph_cannot_be_read(page: Page, begun: Path):
+    damaged = sorted(begun.rglob("*.jpg"))[-1]
+    damaged.write_bytes(damaged.read_bytes()[:2000])
+    with opened(page, begun) as tab:
+        enter(tab, "photographs")
+        expect(tab.locator("#not-measured")).to_be_visible()
+
+
 def test_undo_waits_for_what_was_typed_before_it(page: Page, begun: Path):
     with opened(page, begun) as tab:
         enter(tab, "photographs")

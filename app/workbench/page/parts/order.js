@@ -11,7 +11,7 @@ export function orderSection(app) {
   const bad = new Set(series.unusable);
   return [
     h("h2", {}, "Order"),
-    h("p", {}, section.order ? "In the order of order.csv. Drag a row to move it." : "In the natural order of their names: 2 comes before 10. Drag a row to move it."),
+    h("p", {}, section.order ? "In the order of order.csv. Drag a row to move it." : "By the numbers in their names: 2 before 10, and 0000 after 9999. Drag a row to move it."),
     h("div", { class: "row" },
       h("button", { id: "earlier", disabled: app.frame < 1, title: "Alt+←", onclick: () => shift(app, -1) }, "Earlier"),
       h("button", { id: "later", disabled: app.frame >= last, title: "Alt+→", onclick: () => shift(app, 1) }, "Later"),

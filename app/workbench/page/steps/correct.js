@@ -136,7 +136,7 @@ function againCard(app) {
     h("div", { class: "fact" }, h("b", {}, "Tracked again at once"), sign(worse ? "doubtful" : "good")),
     fact("rods lost here", `${again.lost_before} → ${again.lost_after}`),
     h("table", { class: "numbers" }, h("thead", {}, h("tr", {}, ["rod", "correlation", "moved", "state"].map((text) => h("th", { scope: "col" }, text)))),
-      h("tbody", {}, again.changes.slice(0, 12).map((each) => h("tr", {}, [String(each.id), `${value(each.zncc[0])} → ${value(each.zncc[1])}`, each.moved === null ? "–" : `${digits(each.moved, 2)} px`, each.status[0] === each.status[1] ? each.status[1] : `${each.status[0]} → ${each.status[1]}`].map((text) => h("td", {}, text)))))),
+      h("tbody", {}, again.changes.slice(0, 12).map((each) => h("tr", {}, [String(each.id), `${value(each.zncc[0])} → ${value(each.zncc[1])}`, each.moved === null ? "–" : each.moved < 0.001 ? "< 0.001 px" : `${digits(each.moved, 2)} px`, each.status[0] === each.status[1] ? each.status[1] : `${each.status[0]} → ${each.status[1]}`].map((text) => h("td", {}, text)))))),
     h("p", {}, "Nothing is stored of this: the next run computes it for all photographs."));
 }
 

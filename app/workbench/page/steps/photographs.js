@@ -8,7 +8,7 @@ import { tableField } from "/page/parts/tables.js";
 
 const SOON = 400; // [ms]
 const EDITED = "#f0e442";
-let soon = 0, cutting = null, masking = null, brush = null, brushSize = 0, measured = null; // quality: { at, facts, faults, frame, light, contrast }, null while it is measured
+let soon = 0, cutting = null, masking = null, brush = null, brushSize = 0, measured = null; // quality: { at, facts, faults, frame, light, contrast }, or { at, failed }; null while it is measured
 
 export const photographs = {
   name: "photographs", title: "Photographs", frames: true,
@@ -84,11 +84,14 @@ async function measure(app) {
   try {
     const answer = await request("quality", { at: project.at });
     if (app.project?.at === project.at && app.step === photographs) { measured = { at: project.at, ...answer }; app.paint(); }
-  } catch { measured = null; } // the messages of the step state what is wrong
+  } catch { // the messages of the step state what is wrong
+    if (app.project?.at === project.at && app.step === photographs) { measured = { at: project.at, failed: true }; app.paint(); }
+  }
 }
 
 function quality(app) {
   if (measured?.at !== app.project.at) return h("p", { id: "measuring", role: "status" }, "Measuring light and pattern …");
+  if (measured.failed) return h("p", { id: "not-measured" }, "Light and pattern are measured when every photograph can be read.");
   return [
     h("div", { class: "messages", id: "quality" }, [["good", measured.facts], ["doubtful", measured.faults]].flatMap(([mark, texts]) => texts.map((text) => h("p", {}, sign(mark), text)))),
     measured.frame.length > 1 ? [h("span", { class: "soft" }, "light (line) and contrast (dashed) over the photographs [of 255]"), chart(64, "light and contrast over the photographs", (c, width, height) => curves(app, c, width, height))] : null,
@@ -97,7 +100,7 @@ function quality(app) {
 
 /** Mean grey level and contrast of the measured photographs; a bar marks the one that is shown. */
 function curves(app, c, width, height) {
-  if (!app.project || !measured) return; // drawn a moment later: somebody may have gone on
+  if (!app.project || !measured?.frame) return; // drawn a moment later: somebody may have gone on
   const { frame, light, contrast } = measured, pad = 30, last = Math.max(app.project.files.length - 1, 1);
   const high = 1.08 * Math.max(...light, ...contrast, 1), x = (k) => pad + k / last * (width - pad - 8), y = (v) => height - 6 - v / high * (height - 14);
   c.fillStyle = colour("accent"); c.globalAlpha = 0.18; c.fillRect(x(app.frame) - 3, 2, 6, height - 4); c.globalAlpha = 1;

@@ -9,7 +9,7 @@ let chosen = null, held = null, quality = null, typedRadii = null, proposed = nu
 export const rods = {
   name: "rods", title: "Rods", edits: 0,
   layers: ["photograph", "mask", "walls", "marks"], below: ["mask", "walls"],
-  hint: (app) => (app.project.rods ? "Click a rod to choose it, beside one to add one; drag to move; Shift+wheel to resize; Delete" : ""),
+  hint: (app) => (app.project.rods ? "Click chooses a rod or adds one; drag moves, Shift+wheel resizes, Delete removes it" : ""),
   keyHelp: [["Delete", "delete the chosen rod"], ["[ ]", "make it smaller, larger"], ["Shift+arrows", "move it by a quarter pixel"], ["N", "the next doubtful rod"]],
   enter: (app) => { chosen = null; held = null; proposed = null; typedRadii = (app.project.photographs.radii ?? []).map((r) => within("length", r, 6)).join(", "); },
   tool,

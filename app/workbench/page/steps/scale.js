@@ -1,9 +1,10 @@
 // Step 2: the size of a pixel: two points and their distance, rods of known radius, or the number.
 
-import { request, digits, fact, h, numberField, notify } from "/page/dom.js";
+import { request, digits, fact, h, numberField, notify, sign } from "/page/dom.js";
 import { lensForm } from "/page/parts/lens.js";
 import { choice, measured, typed, unit, within } from "/page/units.js";
 
+const ALIKE = 0.02; // greatest relative difference of the scales of two rods
 let mode = "distance", line = null, metres = null, rods = [], drawn = null, held = null;
 
 export const scale = {
@@ -30,8 +31,9 @@ export const scale = {
       ] : null,
       mode === "rods" ? [
         h("p", {}, "Measure a few rods of radii that you know; their sum sets the scale."),
-        rods.map((rod, k) => h("div", { class: "row" }, fact(`rod ${k + 1}`, `${digits(rod.r, 5)} px`), numberField(`radius ${"abcdefghij"[k] ?? ""}`, rod.radius ? within("length", rod.radius, 6) : "", unit("length"), (text) => app.queue(async () => { rod.radius = typed("length", text, "radius"); app.paint(); })),
+        rods.map((rod, k) => h("div", { class: "row known" }, fact(`rod ${k + 1}`, `${digits(rod.r, 5)} px${rod.seen ? "" : ", as drawn"}`), numberField(`radius ${"abcdefghij"[k] ?? ""}`, rod.radius ? within("length", rod.radius, 6) : "", unit("length"), (text) => app.queue(async () => { rod.radius = typed("length", text, "radius"); app.paint(); })),
           h("button", { class: "quiet", title: "Remove it", onclick: () => { rods.splice(k, 1); app.paint(); } }, "✕"))),
+        disagreeing().length ? h("div", { class: "messages", id: "disagreeing" }, h("p", {}, sign("doubtful"), `The radii disagree: rod ${disagreeing().join(", ")} by more than ${100 * ALIKE} %. Is its radius another one, or its circle beside the rim?`)) : null,
         rods.length ? h("button", { class: "primary", disabled: rods.some((rod) => !rod.radius), onclick: () => app.change("set_scale", { rods: rods.map((rod) => ({ radius: rod.radius, pixels: rod.r })) }, "", reportScale) }, "Set the scale by these") : null,
       ] : null,
       mode === "number" ? numberField("pixel size", pixel ? within("length", pixel, 7) : "", unit("length"), (text) => app.queue(async () => { const size = typed("length", text, "pixel size"); app.change("set_scale", { pixel_size: size }, "", reportScale); })) : null,
@@ -56,6 +58,14 @@ export const scale = {
     return true;
   },
 };
+
+/** Numbers of the rods whose scale differs from the median of all. */
+function disagreeing() {
+  const size = rods.map((rod) => rod.radius / rod.r), ordered = size.filter((each) => each > 0).sort((a, b) => a - b);
+  if (ordered.length < 2) return [];
+  const middle = ordered[Math.floor(ordered.length / 2)];
+  return size.flatMap((each, k) => (each > 0 && Math.abs(each / middle - 1) > ALIKE ? [k + 1] : []));
+}
 
 const reportScale = (project) => notify(`One pixel is ${measured("length", project.pixel, 5)}`);
 
@@ -87,6 +97,7 @@ function tools(app) {
         app.queue(async () => {
           const found = await request("measure_rod", { at: app.project.at, x: rough.x, y: rough.y, radius: rough.r });
           rods.push({ ...found, radius: rods.at(-1)?.radius ?? null }); drawn = null; app.paint();
+          if (!found.seen) notify("No rim is seen there: the radius is as drawn", true);
         }, "Looking for the rim …");
       },
     },

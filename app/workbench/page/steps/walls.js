@@ -16,7 +16,7 @@ const TURNED = 0.2; // [rad] by which two bars meet no more
 export const walls = {
   name: "walls", title: "Walls", edits: 0,
   layers: ["photograph", "mask", "rods", "marks"], below: ["mask", "rods"],
-  hint: (app) => (app.project.pixel ? drawing.corner ? "Click a disc in a corner of the frame: its rim is found" : drawing.circle ? `Click three points on the rim, far apart (${points.length} of 3); drag its centre or rim to correct it` : "Drag along the inner edge of a bar: the line snaps to it. Drag an end to correct it" : "Set the scale first"),
+  hint: (app) => (app.project.pixel ? drawing.corner ? "Click a disc in a corner of the frame: its rim is found" : drawing.circle ? `Click three points on the rim, far apart (${points.length} of 3); drag its centre or rim to correct it` : "Drag along the inner edge of a bar, or an end to correct it" : "Set the scale first"),
   keyHelp: [["Delete", "delete the chosen wall"], ["S", "snap to the edge, or not"], ["C", "draw circles, corner discs, or bars"]],
   enter: (app) => { chosen = null; draw(app.project.walls.length > 0 && app.project.walls.every((wall) => wall.circle) ? "circle" : "bars"); },
   tool: (app) => (app.project.pixel ? tool(app) : null),

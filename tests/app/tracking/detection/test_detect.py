@@ -27,6 +27,14 @@ def test_every_rod_is_found_and_nothing_else(packed: tuple[Rods, Detection]) -> 
     assert np.array_equal(found.radius[index], rods.radius)
 
 
+@pytest.mark.screen
+def test_every_rod_of_a_large_photograph_is_found() -> None:
+    """Large rods are searched for on a shrunk photograph, whose pixels are wide."""
+    classes = (78.0, 89.0, 122.0)
+    rods = lay_rods(2, classes, width=1700, height=1500)
+    assert detect_grains(rods.reference(), DetectionSettings(radii=classes)).count == rods.count
+
+
 def test_centres_are_exact_to_a_tenth_of_a_pixel(packed: tuple[Rods, Detection]) -> None:
     rods, found = packed
     index, _ = match(found, rods)
