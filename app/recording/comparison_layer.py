@@ -167,7 +167,7 @@ def _log_styles(stream: rr.RecordingStream, scene: Scene, comparison: Comparison
 
 
 def _log_frame(clock: Clock, scene: Scene, comparison: Comparison, axes: Axes) -> None:
-    k, stream = clock.frame, clock.stream
+    k = clock.frame
     a, b = comparison.first.frames[k], comparison.second.frames[k]
     log_caption(clock, scene, comparison.base.frames[k])
     log_grains_and_walls(clock, scene, comparison.base.frames[k])
@@ -178,7 +178,7 @@ def _log_frame(clock: Clock, scene: Scene, comparison: Comparison, axes: Axes) -
     _, ft = _on_union(a, b, "ft")
     log_difference(clock, scene, DIFFERENCE, key, fn, ft)
     reach = axes.x_range[1]
-    stream.log(
+    clock.log(
         SCATTER,
         rr.Points2D(
             axes.points(np.minimum(fn[1], reach), np.minimum(fn[0], reach)),
@@ -197,7 +197,7 @@ def _log_frame(clock: Clock, scene: Scene, comparison: Comparison, axes: Axes) -
 def _log_network(clock: Clock, scene: Scene, path: str, field: FieldFrame) -> None:
     shown = np.flatnonzero(np.isfinite(field.contacts.point).all(axis=1))
     contacts, fn, ft = field.contacts.select(shown), field.fn[shown], field.ft[shown]
-    clock.stream.log(
+    clock.log(
         path,
         rr.LineStrips2D(
             scene.branches(clock.frame, contacts), radii=scene.style.radii(fn), colors=scene.style.colours(fn),

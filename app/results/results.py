@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,13 @@ class TruthContacts:
         return tuple((key[a:b], force[a:b]) for a, b in pairwise(bounds))
 
 
+@runtime_checkable
+class ReadsFrames(Protocol):
+    """Reads kinematics of some frames without those of all others."""
+
+    def of_frames(self, frames: slice) -> SequenceKinematics | None: ...
+
+
 def _none() -> None:
     """No kinematics."""
 
@@ -81,6 +89,13 @@ class Results:
     def kinematics(self) -> SequenceKinematics | None:
         """Motion beyond the mean field; None: fewer than two frames, or not all are there. A file is read each time."""
         return self.read_kinematics()
+
+    def kinematics_of(self, frames: slice) -> SequenceKinematics | None:
+        """Kinematics with the maps of some frames; of a file, only these are read."""
+        if isinstance(self.read_kinematics, ReadsFrames):
+            return self.read_kinematics.of_frames(frames)
+        whole = self.kinematics
+        return None if whole is None else whole.of_frames(frames)
 
     def contact_friction(self, frame: int) -> Array:
         """Coefficient of friction used at every contact of a frame (c,); files of earlier versions hold one for all."""

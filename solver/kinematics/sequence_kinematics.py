@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..bodies.cell import Cell
 from ..bodies.grains import Array
 from ..bodies.strain import logarithmic_strain, shear_strain
-from ..quantity import Quantity
+from ..quantity import Quantity, columns
 from .local_density import local_solid_fraction, triangulate
 from .local_motion import measure_local_motion
 from .mean_field import FLUCTUATION_BINS, excess_kurtosis, fit_mean_field, fluctuation_density
@@ -93,6 +93,10 @@ class SequenceKinematics:
     window_correlation_length: Annotated[
         Array, Quantity("distance at which it falls below 1/e", "m", "strain_window", since=2)
     ]
+
+    def of_frames(self, frames: slice) -> SequenceKinematics:
+        """Return the maps of some frames, with all strain windows."""
+        return replace(self, **{name: getattr(self, name)[frames] for name in columns(SequenceKinematics, "frame")})
 
 
 def measure_kinematics(

@@ -51,7 +51,7 @@ class ForceDensity:
         self._pooled += counts
         self._total += len(loaded)
         clock.end()
-        clock.stream.log(
+        clock.log(
             entities.FORCE_DENSITY,
             rr.Points2D(
                 density_points(*merge_bins(counts, 1), len(loaded)),
@@ -60,7 +60,7 @@ class ForceDensity:
                 draw_order=20.0,
             ),
         )
-        clock.stream.log(
+        clock.log(
             entities.FORCE_DENSITY_POOLED,
             rr.LineStrips2D(
                 [density_points(*merge_bins(self._pooled), self._total)],
@@ -81,11 +81,11 @@ class ForceDensity:
             shown = power >= DECADES[0]
             strips = [AXES.points(x[shown], power[shown])]
             texts = [(AXES.points(np.array(6.2), np.array(-0.5)), f"its tail exp(−{exponent:.2f} x)", SERIES[0])]
-        clock.stream.log(
+        clock.log(
             entities.FORCE_DENSITY_TAIL,
             rr.LineStrips2D(strips, radii=np.float32(0.9), colors=packed_one(SERIES[0]), draw_order=15.0),
         )
-        log_texts(clock.stream, entities.FORCE_DENSITY_TAIL_VALUE, texts, static=False)
+        log_texts(clock, entities.FORCE_DENSITY_TAIL_VALUE, texts, static=False)
 
 
 def merge_bins(counts: Array, least: int = 4) -> tuple[Array, Array, Array]:

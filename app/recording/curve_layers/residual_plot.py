@@ -64,7 +64,7 @@ class ResidualPlot:
         strips = [*curves, axes_points(axes, COLD_SWEEPS[known].astype(float), cold[known])]
         shown = [len(strip) > 1 for strip in strips]
         clock.start()
-        clock.stream.log(
+        clock.log(
             entities.RESIDUAL_CURVES,
             rr.LineStrips2D(
                 [strip for strip, keep in zip(strips, shown, strict=True) if keep],
@@ -81,7 +81,7 @@ class ResidualPlot:
         rows = at if len(at) and at[0] == 0 else np.concatenate([[0], at])
         places = [axes_points(axes, np.full(3, 1.0 + row), residuals[:, row], keep=True) for row in rows.tolist()]
         clock.start()
-        clock.stream.log(
+        clock.log(
             entities.RESIDUAL_MARKS,
             rr.Points2D(places[0], radii=np.float32(4.5), colors=packed(np.array(COLOURS, np.uint8)), draw_order=20.0),
         )
@@ -94,7 +94,7 @@ class ResidualPlot:
         sweep, value = np.array([forces.history.count + 1.0]), np.array([forces.unbalance])
         known = np.isfinite(value)
         clock.end()
-        clock.stream.log(
+        clock.log(
             entities.RESIDUAL_REPORTED,
             rr.Points2D(
                 axes_points(axes, sweep[known], value[known], keep=True), radii=np.float32(6.5),

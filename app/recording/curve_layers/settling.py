@@ -90,8 +90,8 @@ def log_settling_styles(stream: rr.RecordingStream) -> None:
 def log_settling(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     """Log lanes, trust and flags of one frame."""
     clock.start()
-    clock.stream.log(entities.STATUS_LANE, rr.StateChange(state=forces.status.name.lower()))
-    clock.stream.log(entities.TRACKING_LANE, rr.StateChange(state=tracking_state(scene.tracks, clock.frame)))
+    clock.log(entities.STATUS_LANE, rr.StateChange(state=forces.status.name.lower()))
+    clock.log(entities.TRACKING_LANE, rr.StateChange(state=tracking_state(scene.tracks, clock.frame)))
     _log_flags(clock, scene, forces)
     clock.end()
     for path, value in (
@@ -117,7 +117,7 @@ def _log_error_budget(clock: Clock, fraction: Array) -> None:
     log_scalars(clock, entities.ERROR_BUDGET, fraction)
     colours = [(*SERIES, BOUNDARY, INK)[part] for part in range(len(ERROR_PARTS))]
     style = rr.SeriesLines(colors=colours, names=list(ERROR_PARTS), widths=[2.0] * len(ERROR_PARTS))
-    clock.stream.log(entities.ERROR_BUDGET, style, static=True)
+    clock.log(entities.ERROR_BUDGET, style, static=True)
 
 
 def tracking_state(tracks: Tracks, frame: int) -> str:
@@ -149,7 +149,7 @@ def _log_flags(clock: Clock, scene: Scene, forces: FrameForces) -> None:
 
 
 def _log_flag(clock: Clock, text: str, level: str) -> None:
-    clock.stream.log(entities.FLAGS, rr.TextLog(printable(text), level=level))
+    clock.log(entities.FLAGS, rr.TextLog(printable(text), level=level))
 
 
 def _listed(scene: Scene, rows: np.ndarray) -> str:

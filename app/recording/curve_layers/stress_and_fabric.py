@@ -36,16 +36,16 @@ def log_stress(clock: Clock, statistics: FrameStatistics) -> None:
     """Log the principal stresses and the normal stress in every direction, divided by the pressure."""
     clock.end()
     if not (np.all(np.isfinite(statistics.stress)) and statistics.pressure > 0.0):
-        clock.stream.log(entities.STRESS_CROSS, rr.LineStrips2D([]))
-        clock.stream.log(entities.STRESS_VALUES, rr.Points2D([], labels=[]))
-        clock.stream.log(entities.STRESS_CURVE, rr.LineStrips2D([]))
+        clock.log(entities.STRESS_CROSS, rr.LineStrips2D([]))
+        clock.log(entities.STRESS_VALUES, rr.Points2D([], labels=[]))
+        clock.log(entities.STRESS_CURVE, rr.LineStrips2D([]))
         return
     stress = 0.5 * (statistics.stress + statistics.stress.T)
     value, axis = np.linalg.eigh(stress)
     value, axis = value[::-1], axis[:, ::-1]  # greatest first
     ratio = value / statistics.pressure
     tips = np.stack([axis[0], -axis[1]], axis=1) * (100.0 * ratio)[:, None]
-    clock.stream.log(
+    clock.log(
         entities.STRESS_CROSS,
         rr.LineStrips2D(
             np.stack([-tips, tips], axis=1).astype(np.float32),
@@ -59,11 +59,11 @@ def log_stress(clock: Clock, statistics: FrameStatistics) -> None:
         (_corner(STRESS_REACH, 0), f"σ₁ {1e-3 * value[0]:.1f} kPa at {f'{angle:.0f}'.replace('-', '−')}°", SERIES[0]),
         (_corner(STRESS_REACH, 1), f"σ₂ {1e-3 * value[1]:.1f} kPa", SERIES[1]),
     ]
-    log_texts(clock.stream, entities.STRESS_VALUES, texts, static=False)
+    log_texts(clock, entities.STRESS_VALUES, texts, static=False)
     angle = np.linspace(0.0, 2.0 * np.pi, 97)
     normal = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     radius = np.einsum("ka,ab,kb->k", normal, stress, normal) / statistics.pressure
-    clock.stream.log(
+    clock.log(
         entities.STRESS_CURVE,
         rr.LineStrips2D([polar(angle, radius)], radii=np.float32(0.9), colors=packed_one(INK), draw_order=10.0),
     )
@@ -84,7 +84,7 @@ def log_rose(clock: Clock, forces: FrameForces) -> None:
         (entities.ROSE_OF_FORCES, bearing * fn, SERIES[0], 20.0),
     ):
         strips = [rose_outline(direction_densities(normal, weight))] if len(fn) else []
-        clock.stream.log(
+        clock.log(
             path,
             rr.LineStrips2D(
                 strips, radii=np.float32(1.3), colors=packed_one(colour if strips else FAINT), draw_order=order

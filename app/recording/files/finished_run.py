@@ -15,6 +15,7 @@ import rerun as rr
 
 from ...experiment.units import Scale
 from ...process.errors import RunError
+from ...process.machine.free_memory import release_free_memory
 from ...results.results import Results, TruthContacts
 from ..look import entities
 from ..look.canvas import Canvas
@@ -130,7 +131,8 @@ def write_recording(
     scene = Scene(
         results.name, tracks, results.walls, results.grains, results.friction, results.configuration, canvas,
         ForceStyle.on(canvas, survey.force_range), truth, options.tolerance, results.radius_tuning,
-        tuple(each.sentence() for each in results.diagnosis), camera, results.kinematics, results.fringes,
+        tuple(each.sentence() for each in results.diagnosis), camera,
+        results.kinematics_of if results.kinematics_of(slice(1)) else None, results.fringes,
     )  # fmt: skip
     run = _Run(results, survey, scene, photograph, options.active, progress, part_frames)
     parts = [part_of(path, 1 + k) for k in range(max(-(-len(results.frames) // part_frames), 1))]
@@ -225,6 +227,7 @@ def _write(run: _Run, parts: list[Path], plan: _Plan, notes: tuple[str, ...], ma
             if recorder is None:
                 recorder = Recorder(stream, sweeps=plan.sweeps, kept=plan.kept, flush=written.flush)
                 recorder.start(run.scene)
+                release_free_memory()  # of the ranges of all frames
             else:
                 recorder.continue_in(stream, written.flush)
             send_layout(stream, layout)

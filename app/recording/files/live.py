@@ -132,7 +132,7 @@ class LiveRecording:
         first = ForceRange.of([forces])
         style = ForceStyle.on(self._canvas, ForceRange(first.mean, HEADROOM * first.top))
         scene = Scene(run.name, run.tracks, run.walls, run.grains, run.friction, run.configuration, self._canvas, style)
-        recorder = Recorder(self._running(), sweeps=self._sweeps, kept=SWEEPS_KEPT, flush_every=1)
+        recorder = Recorder(self._running(), sweeps=self._sweeps, kept=SWEEPS_KEPT, send_every=1)
         recorder.start(scene)
         send_layout(self._running(), self._layout(run, self._canvas))
         return recorder

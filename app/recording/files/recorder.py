@@ -51,9 +51,7 @@ PhotographSource = Callable[[int], JpegPhotograph | None]
 # Messages are divided by size, never by time: the same run gives the same file.
 BATCHES = rr.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1_000_000)
 
-# Frames between two flushes, which an incomplete file may lack at its end. With fewer there are more messages, each
-# with an entry in the index; with more frames, more rows wait in memory.
-FRAMES_PER_FLUSH = 50
+FRAMES_PER_FLUSH = 5  # where rows wait until they are many: bounds what the stream holds
 SWEEPS_KEPT = 40  # per frame, with SweepChoice.LOG
 
 
@@ -68,8 +66,9 @@ class Recorder:
         The sweeps that are recorded.
     kept : int
         Sweeps per frame, with SweepChoice.LOG.
-    flush_every : int
-        Frames between two flushes.
+    send_every : int, optional
+        Frames after which all rows are sent, and an incomplete file holds them. Default: rows wait until they are many,
+        because the index of a file takes memory for every message.
     flush : callable
         Sends all logged data of the stream.
     """
@@ -80,12 +79,12 @@ class Recorder:
         *,
         sweeps: SweepChoice = SweepChoice.LOG,
         kept: int = SWEEPS_KEPT,
-        flush_every: int = FRAMES_PER_FLUSH,
+        send_every: int | None = None,
         flush: Callable[[rr.RecordingStream], None] = rr.RecordingStream.flush,
     ) -> None:
         rr.set_strict_mode(True)  # otherwise the SDK only warns about data that it cannot write
         self._stream = stream
-        self._sweeps, self._kept, self._flush_every, self._flush = sweeps, kept, flush_every, flush
+        self._sweeps, self._kept, self._send_every, self._flush = sweeps, kept, send_every, flush
         self._rows = RowBatches(stream)
         self._scene: Scene | None = None
         self._truth: TruthWriter | None = None
@@ -189,8 +188,9 @@ class Recorder:
         self._force_count += len(forces.fn)
         lost = int(scene.tracks.lost[forces.frame].sum())
         self._summaries.append(FrameSummary.of(forces, statistics, lost=lost, agreement=agreement))
-        if len(self._summaries) % self._flush_every == 0:
-            self._rows.send(points=self._flush_every == 1)
+        if self._send_every and len(self._summaries) % self._send_every == 0:
+            self._rows.send()
+        if len(self._summaries) % (self._send_every or FRAMES_PER_FLUSH) == 0:
             self._flush(self._stream)
 
     def finish(self, notes: tuple[str, ...] = ()) -> None:

@@ -1,12 +1,15 @@
 """Rows of several frames, joined to large messages: the index of a recording has an entry for every message.
 
-An entry takes some tens of kilobytes of memory when the index is made, however little the message holds.
+An entry takes some tens of kilobytes of memory until the file is complete, however little the message holds. Rows
+therefore wait, in a bounded memory: the longer the run, the larger the messages of the entities with the most values.
 """
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import cast
 
 import numpy as np
@@ -15,16 +18,26 @@ import rerun as rr
 
 from ..look.clock import Moment
 
-LARGEST = 1_000_000  # [bytes] of one entity's rows from which on they are sent
+WAITING = 24_000_000  # [bytes] of all rows, from which on those of the entity with the most are sent
+PIECES = 32  # arrays that are joined to one: each takes some hundred bytes beside its values
+
+_Names = tuple["rr.ComponentDescriptor | str", ...]
+_Key = tuple[_Names, _Names, tuple[pa.DataType, ...]]  # timelines, components, types
 
 
 @dataclass(slots=True)
 class _Rows:
     """Rows of one entity that have the same timelines and components."""
 
-    times: list[list[pa.Array]] = field(default_factory=list)
-    parts: list[list[pa.Array]] = field(default_factory=list)
-    size: int = 0  # [bytes]
+    columns: list[list[pa.Array]]  # of the timelines, then of the components
+
+    def add(self, arrays: Sequence[pa.Array]) -> int:
+        """Add one array to every column; return their size [bytes]."""
+        for column, each in zip(self.columns, arrays, strict=True):
+            column.append(each)
+        if len(self.columns[0]) >= PIECES:
+            self.columns = [[_joined(column)] for column in self.columns]
+        return sum(each.nbytes for each in arrays)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,64 +55,117 @@ class _Joined:
         return self.name
 
     def as_arrow_array(self) -> pa.Array:
-        return pa.concat_arrays(self.arrays)
+        return _joined(self.arrays)
+
+
+@dataclass(slots=True)
+class _Points:
+    """Points of the curves of one entity, in a hundredth of the memory of their rows."""
+
+    moment: Moment  # of the first point
+    times: list[array[int]]  # of every timeline
+    counts: array[int] = field(default_factory=lambda: array("q"))
+    values: array[float] = field(default_factory=lambda: array("d"))
 
 
 class RowBatches:
-    """Collects rows and points of curves of a stream until they are many, or until `send` is called."""
+    """Collects rows and points of curves of a stream until they are many, or until `send` is called.
+
+    Rows of one entity are sent together: where several have the same time on a timeline, the viewer shows the one that
+    was sent last.
+    """
 
     def __init__(self, stream: rr.RecordingStream) -> None:
         self._stream = stream
         self._moment: Moment = ()
-        self._points: dict[tuple[str, tuple[str, ...]], list[tuple[Moment, Sequence[float]]]] = {}
-        self._rows: dict[tuple[str, tuple[str, ...], tuple[rr.ComponentDescriptor, ...]], _Rows] = {}
+        self._times: list[pa.Array] | None = None  # of the moment
+        self._points: dict[tuple[str, _Names], _Points] = {}
+        self._rows: dict[str, dict[_Key, _Rows]] = {}  # by path; keys stay, in the order of their first rows
+        self._sizes: dict[str, int] = {}  # [bytes] of the rows of a path
+        self._size = 0  # [bytes] of all rows
 
     def begin(self, moment: Moment) -> None:
-        """Set the time of the points that follow."""
-        self._moment = moment
+        """Set the time of the rows and points that follow."""
+        self._moment, self._times = moment, None
 
     def add_point(self, path: str, values: Sequence[float]) -> None:
         """Add a point of the curves of an entity."""
         timelines = tuple(name for name, _ in self._moment)
-        self._points.setdefault((path, timelines), []).append((self._moment, values))
+        points = self._points.get((path, timelines))
+        if points is None:
+            points = self._points[path, timelines] = _Points(self._moment, [array("q") for _ in timelines])
+        for times, (_, value) in zip(points.times, self._moment, strict=True):
+            times.append(_whole(value))
+        points.counts.append(len(values))
+        points.values.extend(values)
+
+    def add_row(self, path: str, parts: Sequence[rr.DescribedComponentBatch]) -> None:
+        """Add one row of an entity at the time that was set."""
+        if self._times is None:
+            self._times = [_times(value, array("q", [_whole(value)])) for _, value in self._moment]
+        values = [_one_row(each.as_arrow_array()) for each in parts]
+        descriptors = tuple(each.component_descriptor() for each in parts)
+        self._add(path, tuple(name for name, _ in self._moment), descriptors, [*self._times, *values])
 
     def add(self, path: str, when: Iterable[rr.TimeColumn], columns: Iterable[rr.ComponentColumn]) -> None:
         """Add rows of an entity."""
         times = {each.timeline_name(): each.as_arrow_array() for each in when}
         parts = {each.component_descriptor(): each.as_arrow_array() for each in columns}
-        key = path, tuple(times), tuple(parts)
-        rows = self._rows.setdefault(key, _Rows())
-        rows.times.append(list(times.values()))
-        rows.parts.append(list(parts.values()))
-        rows.size += sum(array.nbytes for array in (*times.values(), *parts.values()))
-        if rows.size >= LARGEST:
-            self._send(key)
+        self._add(path, tuple(times), tuple(parts), [*times.values(), *parts.values()])
 
-    def send(self, *, points: bool = True) -> None:
-        """Send all rows that were added, and the points, which are small, unless they can wait."""
-        for key in list(self._rows):
-            self._send(key)
-        if not points:
-            return
-        for (path, timelines), found in self._points.items():
-            when = [_times(name, [moment[k][1] for moment, _ in found]) for k, name in enumerate(timelines)]
-            columns = rr.Scalars.columns(scalars=[value for _, values in found for value in values])
-            self._stream.send_columns(path, when, columns.partition([len(values) for _, values in found]))
+    def send(self) -> None:
+        """Send all rows and points that were added."""
+        for path in list(self._sizes):
+            self._send(path)
+        for (path, _), points in self._points.items():
+            when = [
+                _Joined(name, [_times(value, times)])
+                for (name, value), times in zip(points.moment, points.times, strict=True)
+            ]
+            columns = rr.Scalars.columns(scalars=np.array(points.values))
+            self._stream.send_columns(path, when, columns.partition(np.array(points.counts)))
         self._points.clear()
 
-    def _send(self, key: tuple[str, tuple[str, ...], tuple[rr.ComponentDescriptor, ...]]) -> None:
-        rows, (path, timelines, components) = self._rows.pop(key), key
-        when = [
-            _Joined(name, list(arrays)) for name, arrays in zip(timelines, zip(*rows.times, strict=True), strict=True)
-        ]
-        columns = [
-            _Joined(name, list(arrays)) for name, arrays in zip(components, zip(*rows.parts, strict=True), strict=True)
-        ]
-        # The SDK takes the name and the array of a column, and no more.
-        self._stream.send_columns(path, when, cast("list[rr.ComponentColumn]", columns))
+    def _add(self, path: str, timelines: _Names, components: _Names, arrays: list[pa.Array]) -> None:
+        of_path = self._rows.setdefault(path, {})
+        key = timelines, components, tuple(each.type for each in arrays)
+        rows = of_path.get(key)
+        if rows is None:
+            rows = of_path[key] = _Rows([[] for _ in arrays])
+        size = rows.add(arrays)
+        self._sizes[path] = self._sizes.get(path, 0) + size
+        self._size += size
+        if self._size >= WAITING:
+            self._send(max(self._sizes, key=self._sizes.__getitem__))
+
+    def _send(self, path: str) -> None:
+        self._size -= self._sizes.pop(path, 0)
+        for (timelines, components, _), rows in self._rows[path].items():
+            if not rows.columns[0]:
+                continue
+            columns = [
+                _Joined(name, arrays) for name, arrays in zip(chain(timelines, components), rows.columns, strict=True)
+            ]
+            rows.columns = [[] for _ in rows.columns]
+            when, values = columns[: len(timelines)], columns[len(timelines) :]
+            # The SDK takes the name and the array of a column, and no more.
+            self._stream.send_columns(path, when, cast("list[rr.ComponentColumn]", values))
 
 
-def _times(timeline: str, values: Sequence[int | np.timedelta64]) -> rr.TimeColumn:
-    if isinstance(values[0], np.timedelta64):
-        return rr.TimeColumn(timeline, duration=np.array(values))
-    return rr.TimeColumn(timeline, sequence=np.array(values, np.int64))
+def _whole(value: int | np.timedelta64) -> int:
+    """Return the value on a timeline as a whole number, of nanoseconds for a duration."""
+    return int(value.astype("m8[ns]").astype(np.int64)) if isinstance(value, np.timedelta64) else value
+
+
+def _times(kind: int | np.timedelta64, values: array[int]) -> pa.Array:
+    """Return whole numbers as times of the kind of a value."""
+    return pa.array(np.frombuffer(values, "m8[ns]" if isinstance(kind, np.timedelta64) else np.int64))
+
+
+def _one_row(values: pa.Array) -> pa.Array:
+    return pa.ListArray.from_arrays(np.array([0, len(values)], np.int32), values)
+
+
+def _joined(arrays: list[pa.Array]) -> pa.Array:
+    # The default pool would keep several times the memory of arrays that grow.
+    return pa.concat_arrays(arrays, memory_pool=pa.system_memory_pool())

@@ -10,6 +10,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from ...solver.bodies.grains import Array
+from .clock import Clock
 from .colours import FAINT, INK, Rgba, packed, packed_one
 
 WIDTH, HEIGHT = 600.0, 380.0  # of a plot, in units of its view
@@ -77,7 +78,7 @@ class Axes:
 
 
 def log_texts(
-    stream: rr.RecordingStream, path: str, texts: Sequence[tuple[NDArray, str, Rgba]], *, static: bool = True
+    stream: rr.RecordingStream | Clock, path: str, texts: Sequence[tuple[NDArray, str, Rgba]], *, static: bool = True
 ) -> None:
     """Log coloured texts at points (2,) in view coordinates."""
     stream.log(

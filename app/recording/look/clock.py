@@ -19,10 +19,13 @@ class RowSink(Protocol):
     """Receives rows that are sent in larger messages later."""
 
     def begin(self, moment: Moment) -> None:
-        """Set the time of the points that follow."""
+        """Set the time of the rows and points that follow."""
 
     def add(self, path: str, when: Iterable[rr.TimeColumn], columns: Iterable[rr.ComponentColumn]) -> None:
         """Add rows of an entity."""
+
+    def add_row(self, path: str, parts: Sequence[rr.DescribedComponentBatch]) -> None:
+        """Add one row of an entity at the time that was set."""
 
     def add_point(self, path: str, values: Sequence[float]) -> None:
         """Add a point of the curves of an entity."""
@@ -64,6 +67,17 @@ class Clock:
                 self.stream.set_time(timeline, sequence=value)
         if self.rows is not None:
             self.rows.begin(tuple(moment.items()))
+
+    def log(self, path: str, *parts: rr.AsComponents, static: bool = False) -> None:
+        """Send archetypes of an entity at the time that was set, or at all times.
+
+        As rows they need a message of the file together with those of many frames; the stream would hold each for
+        itself, in several times the memory of its values.
+        """
+        if self.rows is None or static:
+            self.stream.log(path, *parts, static=static)
+        else:
+            self.rows.add_row(path, [batch for part in parts for batch in part.as_component_batches()])
 
     def send(self, path: str, when: Iterable[rr.TimeColumn], columns: Iterable[rr.ComponentColumn]) -> None:
         """Send rows of an entity at their times."""

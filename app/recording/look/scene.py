@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,7 +42,7 @@ class Scene:
     radius_tuning: RadiusTuning | None = None
     diagnosis: tuple[str, ...] = ()  # sentences
     camera: str = ""  # its distortion with intervals, a sentence; empty: not sought
-    kinematics: SequenceKinematics | None = None
+    kinematics: Callable[[slice], SequenceKinematics | None] | None = None  # of some frames; None: not measured
     fringes: FringePressures | None = None  # beside photoelastic photographs
 
     @property

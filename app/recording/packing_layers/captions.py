@@ -27,18 +27,18 @@ def log_caption(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     if clock.last > clock.first:
         clock.start()
         text = f"{when}\n{forces.history.count} sweeps: not yet the reported field"
-        log_texts(clock.stream, entities.CAPTION, [(place, printable(text), INK)], static=False)
+        log_texts(clock, entities.CAPTION, [(place, printable(text), INK)], static=False)
     clock.end()
     colour = SUSPECT if forces.status in (FrameStatus.SUSPECT, FrameStatus.FAILED) else INK
     text = f"{when}\n{caption_of_trust(forces)}"
-    log_texts(clock.stream, entities.CAPTION, [(place, printable(text), colour)], static=False)
+    log_texts(clock, entities.CAPTION, [(place, printable(text), colour)], static=False)
 
 
 def log_card(clock: Clock, scene: Scene, forces: FrameForces, statistics: FrameStatistics) -> None:
     """Log the card of a frame as a document, whose lines wrap."""
     clock.start()
     text = printable(write_card(scene, forces, statistics, clock.time))
-    clock.stream.log(entities.FRAME_CARD, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+    clock.log(entities.FRAME_CARD, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
 
 
 def write_card(scene: Scene, forces: FrameForces, statistics: FrameStatistics, time: float) -> str:

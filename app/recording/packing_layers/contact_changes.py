@@ -52,7 +52,7 @@ def log_changes(
         (entities.NEW_CONTACTS, scene.branches(clock.frame, new), NEW_CONTACT),
         (entities.LOST_CONTACTS, lost, LOST),
     ):
-        clock.stream.log(
+        clock.log(
             path,
             rr.LineStrips2D(
                 strips,
@@ -79,7 +79,7 @@ def gap_colours(gap: Array, reach: float) -> NDArray[np.uint32]:
 
 
 def _log_gaps(clock: Clock, scene: Scene, contacts: Contacts) -> None:
-    clock.stream.log(
+    clock.log(
         entities.GAPS,
         rr.Points2D(
             scene.canvas.points(scene.contact_points(clock.frame, contacts)).astype(np.float32),

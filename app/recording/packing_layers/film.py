@@ -93,7 +93,7 @@ class FilmWriter:
         nearest = int(np.argmin(np.abs(self._frames - frame)))
         if frame == self._frames[nearest]:
             at = self._places(np.array([nearest]), COLUMNS)
-            clock.stream.log(
+            clock.log(
                 f"{entities.FILM_FRAMES}/{frame}",
                 self._lines(forces, forces.fn[None], at, STRONG),
                 self._names(np.repeat(at, 3, axis=0), film_caption(forces, clock.time)),
@@ -102,7 +102,7 @@ class FilmWriter:
         clock.start()
         at = self._places(np.array([nearest]), COLUMNS)[0]
         frame_lines = self._outline(int(self._frames[nearest])) + at
-        clock.stream.log(
+        clock.log(
             entities.FILM_PLACE,
             rr.LineStrips2D(
                 frame_lines.astype(np.float32), radii=np.float32(0.16 * self._grain), colors=packed_one(LOADED_WALL)
@@ -117,9 +117,7 @@ class FilmWriter:
         names = [f"sweep {row + 1}" for row in rows[chosen].tolist()]
         names[-1] = "reported"
         clock.start()
-        clock.stream.log(
-            entities.FILM_SWEEPS, self._lines(forces, fn[chosen], at, STRONG_SWEEPS), self._names(at, names)
-        )
+        clock.log(entities.FILM_SWEEPS, self._lines(forces, fn[chosen], at, STRONG_SWEEPS), self._names(at, names))
 
     @property
     def _grain(self) -> float:

@@ -45,7 +45,7 @@ def _log_walls(clock: Clock, scene: Scene) -> None:
     if walls.cell is not None:
         _log_cell(clock, scene, walls.cell[clock.frame])
     loaded = walls.loaded
-    clock.stream.log(
+    clock.log(
         entities.WALLS,
         rr.LineStrips2D(
             [canvas.points(line).astype(np.float32) for line in walls.outlines(clock.frame)],
@@ -62,7 +62,7 @@ def _log_walls(clock: Clock, scene: Scene) -> None:
 
 def _log_cell(clock: Clock, scene: Scene, vectors: Array) -> None:
     corners = scene.canvas.points(cell_corners(vectors)[[0, 1, 2, 3, 0]])
-    clock.stream.log(
+    clock.log(
         entities.CELL,
         rr.LineStrips2D(
             corners[None].astype(np.float32), radii=np.float32(0.05 * scene.canvas.grain_radius),
@@ -88,7 +88,7 @@ def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     plain = present & ~np.isin(status, (TrackStatus.SUSPECT, TrackStatus.INFERRED))
     line = np.where(plain, 0.02, 0.05) * canvas.grain_radius
     outlined, colours = is_outlined(tracks.grain_count), grain_colours(status, present, tracks.boundary)
-    clock.stream.log(
+    clock.log(
         entities.GRAINS,
         rr.Ellipses2D(
             centers=centre.astype(np.float32),
@@ -117,7 +117,7 @@ def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     )
     rotation = tracks.rotation[frame] - _first_rotation(tracks.rotation)
     shown = present & np.isfinite(rotation) & outlined
-    clock.stream.log(
+    clock.log(
         entities.GRAIN_SPINS,
         rr.LineStrips2D(
             _spin_marks(centre[shown], radius[shown], rotation[shown]),
@@ -126,7 +126,7 @@ def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
             draw_order=11.0,
         ),
     )
-    clock.stream.log(
+    clock.log(
         entities.GRAINS_LOST,
         rr.LineStrips2D(
             _crosses(centre[~present], radius[~present]),

@@ -63,7 +63,7 @@ def log_residual_maps(
     lost = ~scene.tracks.present[clock.frame]
     unbalance[:, lost | ~scene.grains.free] = np.nan  # boundary grains need no balance
     clock.start()
-    clock.stream.log(
+    clock.log(
         entities.UNBALANCE_MAP,
         rr.Points2D(
             scene.canvas.points(last_seen(scene.tracks.position, clock.frame)).astype(np.float32),
@@ -72,7 +72,7 @@ def log_residual_maps(
             draw_order=5.0,
         ),
     )
-    clock.stream.log(
+    clock.log(
         entities.CHANGE_MAP,
         rr.LineStrips2D(
             scene.branches(clock.frame, drawn.contacts),

@@ -36,7 +36,7 @@ def log_rods(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     outlined = is_outlined(tracks.grain_count)
     centre = np.column_stack([position, np.full(len(position), -0.5 * scene.rod_length if outlined else 0.0)])
     size = (0.97 * radius[present]).astype(np.float32)  # a dark seam separates the rods
-    clock.stream.log(
+    clock.log(
         entities.RODS,
         rr.Cylinders3D(
             lengths=np.full(int(present.sum()), scene.rod_length, np.float32),
@@ -58,7 +58,7 @@ def _log_caption(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     place = [float(np.nanmean(top[:, 0])), float(np.nanmax(top[:, 1]) + 3.0 * scene.tracks.radius.max()), 0.0]
     key = f"rods of {1e3 * scene.rod_length:g} mm; forces from {style.mean:.3g} N (red) to {style.top:.3g} N (cream)"
     text = f"{caption_of_time(forces, clock.time)}\n{caption_of_trust(forces)}\n{key}"
-    clock.stream.log(
+    clock.log(
         entities.ROD_CAPTION,
         rr.Points3D(
             [place], radii=np.float32(1e-6), colors=packed_one(INK), labels=[printable(text)], show_labels=True
@@ -74,7 +74,7 @@ def _log_chains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     height = np.full(len(start), 0.6 * CHAIN_RADIUS_FRACTION * scene.tracks.radius.max())  # just in front of the ends
     fraction = np.clip(forces.fn[strong] / style.range.top, 0.0, 1.0)
     radius = CHAIN_RADIUS_FRACTION * float(np.mean(scene.tracks.radius)) * fraction
-    clock.stream.log(
+    clock.log(
         entities.ROD_CHAINS,
         rr.Capsules3D(
             lengths=np.linalg.norm(branch, axis=1).astype(np.float32),

@@ -22,7 +22,7 @@ def log_verdicts(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     contacts, source = forces.contacts.select(rows), forces.source[rows]
     added = source == ContactSource.ADDED_BY_REVIEWER
     clock.start()
-    clock.stream.log(
+    clock.log(
         entities.VERDICTS,
         rr.LineStrips2D(
             scene.branches(clock.frame, contacts),

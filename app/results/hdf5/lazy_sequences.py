@@ -31,6 +31,10 @@ class LazySequence(Sequence[T], Generic[T]):
         k += self._count if k < 0 else 0
         if not 0 <= k < self._count:
             raise IndexError(f"index {index} is out of range: there are {self._count} frames")
+        return self._item(k)
+
+    def _item(self, k: int) -> T:
+        # Caches override this: their own method as `_make` would be a reference cycle, which outlives its last use.
         return self._make(k)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -42,8 +46,8 @@ class CachedSequence(LazySequence[T]):
 
     def __init__(self, count: int, make: Callable[[int], T], size: Callable[[T], int], capacity: int) -> None:
         """Make a sequence of `count` items; size: bytes of an item; capacity: bytes of the cache."""
-        super().__init__(count, self._find)
-        self._make_item, self._size, self._capacity = make, size, capacity
+        super().__init__(count, make)
+        self._size, self._capacity = size, capacity
         self._cache: OrderedDict[int, tuple[T, int]] = OrderedDict()
         self._used = 0
         self._lock = threading.Lock()
@@ -52,12 +56,12 @@ class CachedSequence(LazySequence[T]):
         """Set a larger number of items."""
         self._count = count
 
-    def _find(self, k: int) -> T:
+    def _item(self, k: int) -> T:
         with self._lock:
             if k in self._cache:
                 self._cache.move_to_end(k)
                 return self._cache[k][0]
-        item = self._make_item(k)
+        item = self._make(k)
         size = self._size(item)
         with self._lock:
             if k not in self._cache:

@@ -36,6 +36,7 @@ from ..schema import (
 from .lazy_sequences import LazySequence
 
 CACHED_FRAMES = 4  # most recent frames
+EVERY = slice(None)  # row
 BLOCK = 64  # frames whose numbers of sweeps are checked at once
 KEPT = ("kept_sweep", "kept_force")  # dimensions of sweeps with stored forces
 CACHE = 1 << 16  # [bytes] of cached decompressed values per dataset
@@ -50,12 +51,16 @@ class StoredRun:
         self._found: dict[str, h5py.Dataset | None] | None = None  # filled once the file is checked
         self._sizes = self._find_sizes()
 
-    def part(self, part: str) -> Any:
-        """Return one of PARTS that occurs once in the file, None if the file has no dataset of it."""
+    def part(self, part: str, frames: slice = EVERY) -> Any:
+        """Return one of PARTS that occurs once in the file, None if the file has no dataset of it.
+
+        frames: rows of the columns of frames that are read.
+        """
         here = entries(part)
         if all(self._find(each) is None for each in here if each.path.startswith(part)):
             return None
-        return restore(PARTS[part], {each.attribute: self.read(each) for each in here}, "")
+        rows = {each: frames if each.dims[:1] == ("frame",) else EVERY for each in here}
+        return restore(PARTS[part], {each.attribute: self._part(each, rows[each]) for each in here}, "")
 
     def require(self, part: str) -> Any:
         """Return one of PARTS. Raises InputError where it is missing."""
@@ -106,7 +111,7 @@ class StoredRun:
 
     def read(self, entry: Entry) -> Any:
         """Read all values of a dataset, or its declared value where the dataset is absent."""
-        return self._part(entry, slice(None))
+        return self._part(entry, EVERY)
 
     def _part(self, entry: Entry, rows: slice) -> Any:
         """Read some rows of a dataset, or its declared value where the dataset is absent."""
@@ -303,8 +308,11 @@ class StoredPart:
         self._stored, self._part = stored, part
 
     def __call__(self) -> Any:
+        return self.of_frames(EVERY)
+
+    def of_frames(self, frames: slice) -> Any:
         try:
-            return self._stored.part(self._part)
+            return self._stored.part(self._part, frames)
         except (OSError, RuntimeError) as error:
             raise InputError(self._stored.file, f"group {self._part}", f"is damaged: {error}") from None
 
@@ -316,22 +324,22 @@ class StoredFrames(LazySequence[Any]):
     """The forces of every frame of a file, with a cache of the most recent frames."""
 
     def __init__(self, stored: StoredRun, rows: _FrameRows, bodies: dict[str, int], count: int) -> None:
-        super().__init__(count, self._find)
-        self._stored, self._rows, self._bodies = stored, rows, bodies
+        super().__init__(count, partial(_read_frame, stored, rows, bodies))
         self._kept: OrderedDict[int, Any] = OrderedDict()
         self._lock = threading.Lock()
 
-    def _find(self, k: int) -> Any:
+    def _item(self, k: int) -> Any:
         with self._lock:
             if k not in self._kept:
-                self._kept[k] = self._read(k)
+                self._kept[k] = self._make(k)
             self._kept.move_to_end(k)
             while len(self._kept) > CACHED_FRAMES:
                 self._kept.popitem(last=False)
             return self._kept[k]
 
-    def _read(self, k: int) -> Any:
-        try:
-            return self._stored.frame(k, self._rows, self._bodies)
-        except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
-            raise InputError(self._stored.file, f"frame {k}", f"is damaged: {error}") from None
+
+def _read_frame(stored: StoredRun, rows: _FrameRows, bodies: dict[str, int], k: int) -> Any:
+    try:
+        return stored.frame(k, rows, bodies)
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+        raise InputError(stored.file, f"frame {k}", f"is damaged: {error}") from None

@@ -64,12 +64,14 @@ def grain_motion(data: RunData, photograph: int, since: int | None, scale: Scale
     displacements best.
     """
     tracks, frame = data.tracks, photograph - data.first
-    stored = data.results.kinematics if data.results is not None and since is None else None
+    stored = None
+    if data.results is not None and since is None:
+        stored = data.results.kinematics_of(slice(frame, frame + 1))
     window = None if stored is None else stored.window
     start = max(frame - (window or 1), 0) if since is None else since - data.first
     here = np.flatnonzero(tracks.present[frame])
     before, after = tracks.position[start], tracks.position[frame]
-    values = _measured(data, start, frame) if stored is None else _stored(stored, frame)
+    values = _measured(data, start, frame) if stored is None else _stored(stored)
     moved = _pixels_moved(scale, before[here], after[here])
     if values.fluctuation is None:
         fluctuation = moved - _affine(after[here], moved)
@@ -98,11 +100,11 @@ def _fringes(data: RunData, frame: int, here: NDArray[np.intp]) -> dict[str, Any
     return {name: rounded(values[frame, here] / found.mean) for name, values in sums.items()}
 
 
-def _stored(kinematics: SequenceKinematics, frame: int) -> _Values:
-    """The kinematics of a frame as they are in the results."""
+def _stored(kinematics: SequenceKinematics) -> _Values:
+    """The kinematics of one frame as they are in the results."""
     return _Values(
-        kinematics.fluctuation[frame], kinematics.shear_strain[frame], kinematics.volumetric_strain[frame],
-        kinematics.d2min[frame], kinematics.rotation[frame],
+        kinematics.fluctuation[0], kinematics.shear_strain[0], kinematics.volumetric_strain[0],
+        kinematics.d2min[0], kinematics.rotation[0],
     )  # fmt: skip
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -96,7 +95,7 @@ def read_finished_run(folder: Path) -> RunData | None:
     results = load_results(folder / RESULTS)
     stored = results.frames
     frames: CachedSequence[FrameForces] = CachedSequence(len(stored), lambda k: stored[k], _bytes_of, KEPT_BYTES)
-    shown = replace(results, frames=frames, read_kinematics=cache(results.read_kinematics))  # read for every frame
+    shown = replace(results, frames=frames)
     return RunData(
         results.tracks, results.walls, frames, results.statistics, shown,
         first=first_photograph(folder / RESULTS),

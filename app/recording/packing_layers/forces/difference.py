@@ -66,7 +66,7 @@ def log_difference(clock: Clock, scene: Scene, path: str, key: NDArray[np.int64]
     shown = np.flatnonzero(np.isfinite(contacts.point).all(axis=1))
     contacts, fn, ft = contacts.select(shown), fn[:, shown], ft[:, shown]
     difference, style = fn[0] - fn[1], difference_style(scene)
-    clock.stream.log(
+    clock.log(
         path,
         rr.LineStrips2D(
             scene.branches(clock.frame, contacts), radii=style.radii(np.abs(difference)),

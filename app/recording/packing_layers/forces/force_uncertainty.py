@@ -69,7 +69,7 @@ def _log_gaps(clock: Clock, scene: Scene, forces: FrameForces, visible: NDArray[
     gaps = line_gaps(lines, relative_uncertainty(fn, forces.fn_sd[rows]), grain)
     strokes, radii = gap_strokes(gaps, scene.style.radii(fn)[gaps.row], grain)
     quantum = scene.style.quantum
-    clock.stream.log(
+    clock.log(
         entities.FORCE_UNCERTAINTY,
         rr.LineStrips2D(
             strokes.astype(np.float32), radii=(np.ceil(radii / quantum) * quantum).astype(np.float32),

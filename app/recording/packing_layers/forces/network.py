@@ -63,7 +63,7 @@ def log_network(
     rows, fn, _ = visible_sweeps(forces, clock.last - clock.first, choice, kept)
     style, contacts = scene.style, forces.contacts
     clock.start()
-    clock.stream.log(
+    clock.log(
         entities.FORCES,
         rr.LineStrips2D(
             scene.branches(clock.frame, contacts),
@@ -85,7 +85,7 @@ def _log_far_halves(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     """Log the second halves of contacts across the edge of the cell, as reported; the first are with the others."""
     rows, lines = scene.far_halves(clock.frame, forces.contacts)
     fn = np.nan_to_num(forces.fn[rows])
-    clock.stream.log(
+    clock.log(
         entities.FORCES_ACROSS,
         rr.LineStrips2D(
             scene.canvas.points(lines).astype(np.float32),
@@ -248,7 +248,7 @@ def _log_sliding(clock: Clock, scene: Scene, forces: FrameForces) -> None:
 def _log_sliding_points(clock: Clock, scene: Scene, point: NDArray[np.float32], fn: Array) -> None:
     """Log marks whose size increases slightly with the force: weak sliding contacts must not dominate the view."""
     fraction = np.clip(fn / scene.style.range.top, 0.0, 1.0)
-    clock.stream.log(
+    clock.log(
         entities.SLIDING,
         rr.Points2D(
             point,

@@ -71,7 +71,7 @@ class TruthWriter:
         )
         fn, ft = truth.fn[shown], truth.ft[shown]
         clock.start()
-        clock.stream.log(
+        clock.log(
             entities.TRUTH_FORCES,
             rr.LineStrips2D(
                 scene.branches(clock.frame, contacts),
@@ -94,7 +94,7 @@ class TruthWriter:
         log_difference(clock, scene, entities.TRUTH_DIFFERENCE, union[present], both[..., 0], both[..., 1])
         true_fn, inferred_fn = on_truth[:, 0], on_inferred[:, 0]
         reach = self._axes.x_range[1]
-        clock.stream.log(
+        clock.log(
             entities.TRUTH_SCATTER,
             rr.Points2D(
                 self._axes.points(np.minimum(true_fn, reach), np.minimum(inferred_fn, reach)),

@@ -29,8 +29,9 @@ class FringeMaps:
         top = usual_top(self._inferred, measured)
         difference = found.residual / found.mean
         self._maps = tuple(
-            GrainMap(
-                f"{entities.FRINGE_MAPS}/{name}", f"{entities.FRINGE_LEGENDS}/{name}", value, " × mean", end, ramp
+            (
+                GrainMap(f"{entities.FRINGE_MAPS}/{name}", f"{entities.FRINGE_LEGENDS}/{name}", " × mean", end, ramp),
+                value,
             )
             for name, value, end, ramp in (
                 (entities.BY_FRINGES, measured, top, "force"),
@@ -42,7 +43,7 @@ class FringeMaps:
 
     def log_styles(self, stream: rr.RecordingStream) -> None:
         """Log legends, axes, the curve with the discs of all frames, and the name of the correlation."""
-        for each in self._maps:
+        for each, _ in self._maps:
             each.log_legend(stream, self._scene)
         (_, right), (_, high) = self._axes.x_range, self._axes.y_range
         self._axes.log(
@@ -73,15 +74,17 @@ class FringeMaps:
     def log(self, clock: Clock) -> None:
         """Log the maps, the discs in the plot and the correlation of one frame."""
         clock.start()
-        for each in self._maps:
-            each.log(clock, self._scene)
+        for each, value in self._maps:
+            each.log(clock, self._scene, value[clock.frame])
         clock.end()
         known = np.isfinite(self._fringes[clock.frame]) & np.isfinite(self._inferred[clock.frame])
         values = self._fringes[clock.frame, known], self._inferred[clock.frame, known]
-        self._log_points(clock.stream, entities.FRINGES_OF_FRAME, *values, static=False)
+        self._log_points(clock, entities.FRINGES_OF_FRAME, *values, static=False)
         log_scalar(clock, entities.FRINGE_CORRELATION, float(self._found.correlation[clock.frame]))
 
-    def _log_points(self, stream: rr.RecordingStream, path: str, fringes: Array, sums: Array, *, static: bool) -> None:
+    def _log_points(
+        self, stream: rr.RecordingStream | Clock, path: str, fringes: Array, sums: Array, *, static: bool
+    ) -> None:
         points = self._axes.points(
             np.minimum(fringes, self._axes.x_range[1]), np.minimum(sums, self._axes.y_range[1])
         )  # fmt: skip

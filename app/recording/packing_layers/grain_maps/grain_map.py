@@ -32,7 +32,6 @@ class GrainMap:
 
     path: str  # entity of the map
     legend: str  # entity of its legend
-    value: Array  # (f, n) as displayed, NaN: unknown
     unit: str
     top: float  # the colours end there
     ramp: str = "size"  # or force, or difference: of both signs
@@ -50,12 +49,12 @@ class GrainMap:
         value = ((2.0 * fraction - 1.0) if self._signed else fraction) * self.top
         log_ramp_legend(stream, scene.canvas, self.legend, f"{self.legend}/ticks", self.colours(value), self._texts())
 
-    def log(self, clock: Clock, scene: Scene) -> None:
-        """Log the grains of one frame; the clock is at its start."""
+    def log(self, clock: Clock, scene: Scene, value: Array) -> None:
+        """Log the grains of one frame with their values (n,) as displayed, NaN: unknown; the clock is at its start."""
         points = scene.canvas.points(last_seen(scene.tracks.position, clock.frame)).astype(np.float32)
         radii = (0.94 * scene.canvas.lengths(scene.tracks.radius)).astype(np.float32)
-        colours = self.colours(self.value[clock.frame])
-        clock.stream.log(self.path, rr.Points2D(points, radii=radii, colors=colours, draw_order=5.0))
+        colours = self.colours(value)
+        clock.log(self.path, rr.Points2D(points, radii=radii, colors=colours, draw_order=5.0))
 
     @property
     def _signed(self) -> bool:

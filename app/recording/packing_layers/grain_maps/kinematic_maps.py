@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import rerun as rr
 
+from ....solver.bodies.grains import Array
 from ....solver.kinematics.sequence_kinematics import SequenceKinematics
 from ...look import entities
 from ...look.clock import Clock
@@ -16,23 +19,28 @@ from .grain_map import GrainMap, usual_top
 
 ARROW = 2.0  # length of the rms fluctuation, in mean radii
 MICRO = 1e6
+MAPS = (  # entity, unit, ramp
+    (entities.LOCAL_SHEAR, "", "size"),
+    (entities.D2MIN, " µm", "size"),
+    (entities.LOCAL_ROTATION, "°", "difference"),
+)
 
 
 class KinematicMaps:
-    """Maps and curves of the kinematics of one run."""
+    """Maps and curves of the kinematics of one run, of which one frame is in memory.
 
-    def __init__(self, scene: Scene, found: SequenceKinematics) -> None:
-        self._scene, self._found = scene, found
+    read: returns the kinematics of some frames.
+    """
+
+    def __init__(self, scene: Scene, read: Callable[[slice], SequenceKinematics | None]) -> None:
+        self._scene, self._read = scene, read
+        found = self._found(slice(None))
         self._maps = tuple(
             GrainMap(
-                f"{entities.KINEMATIC_MAPS}/{name}", f"{entities.KINEMATIC_LEGENDS}/{name}", value, unit,
-                usual_top(value), ramp,
+                f"{entities.KINEMATIC_MAPS}/{name}", f"{entities.KINEMATIC_LEGENDS}/{name}", unit, usual_top(value),
+                ramp,
             )
-            for name, value, unit, ramp in (
-                (entities.LOCAL_SHEAR, found.shear_strain, "", "size"),
-                (entities.D2MIN, MICRO * np.sqrt(found.d2min), " µm", "size"),
-                (entities.LOCAL_ROTATION, np.degrees(found.rotation), "°", "difference"),
-            )
+            for (name, unit, ramp), value in zip(MAPS, _displayed(found), strict=True)
         )  # fmt: skip
         size = np.sum(found.fluctuation**2, axis=2)
         rms = float(np.sqrt(np.nanmean(size))) if np.isfinite(size).any() else 0.0
@@ -50,16 +58,16 @@ class KinematicMaps:
 
     def log(self, clock: Clock) -> None:
         """Log the maps and curves of one frame."""
-        scene, found, k = self._scene, self._found, clock.frame
-        place = last_seen(scene.tracks.position, k)
+        scene, found, k = self._scene, self._found(slice(clock.frame, clock.frame + 1)), clock.frame
+        place, fluctuation = last_seen(scene.tracks.position, k), found.fluctuation[0]
         clock.start()
-        for each in self._maps:
-            each.log(clock, scene)
-        known = np.isfinite(found.fluctuation[k]).all(axis=1) & np.isfinite(place).all(axis=1)
+        for each, value in zip(self._maps, _displayed(found), strict=True):
+            each.log(clock, scene, value[0])
+        known = np.isfinite(fluctuation).all(axis=1) & np.isfinite(place).all(axis=1)
         start = scene.canvas.points(place[known])
-        end = scene.canvas.points(place[known] + self._stretch * found.fluctuation[k, known])
-        member = found.in_band[k, known]
-        clock.stream.log(
+        end = scene.canvas.points(place[known] + self._stretch * fluctuation[known])
+        member = found.in_band[0, known]
+        clock.log(
             entities.FLUCTUATIONS,
             rr.Arrows2D(
                 origins=start.astype(np.float32), vectors=(end - start).astype(np.float32),
@@ -69,7 +77,17 @@ class KinematicMaps:
             ),
         )  # fmt: skip
         clock.end()
-        log_scalar(clock, entities.PARTICIPATION, float(found.participation[k]))
-        solid = found.solid_fraction[k]
+        log_scalar(clock, entities.PARTICIPATION, float(found.participation[0]))
+        solid = found.solid_fraction[0]
         mean = float(np.nanmean(solid)) if np.isfinite(solid).any() else np.nan
         log_scalar(clock, entities.SOLID_FRACTION, mean)
+
+    def _found(self, frames: slice) -> SequenceKinematics:
+        found = self._read(frames)
+        assert found is not None  # the run has kinematics
+        return found
+
+
+def _displayed(found: SequenceKinematics) -> tuple[Array, Array, Array]:
+    """Return the quantities of MAPS (f, n)."""
+    return found.shear_strain, MICRO * np.sqrt(found.d2min), np.degrees(found.rotation)

@@ -27,8 +27,8 @@ def test_rows_are_the_same_however_many_frames_share_a_message(results, tmp_path
     write_recording(results, tmp_path / "joined.rrd")
     # Small batches: every frame has messages of its own.
     made = recorder.Recorder
-    monkeypatch.setattr(finished_run, "Recorder", lambda *args, **kwargs: made(*args, **kwargs, flush_every=every))
-    monkeypatch.setattr(row_batches, "LARGEST", 1)
+    monkeypatch.setattr(finished_run, "Recorder", lambda *args, **kwargs: made(*args, **kwargs, send_every=every))
+    monkeypatch.setattr(row_batches, "WAITING", 1)
     write_recording(results, tmp_path / "single.rrd")
     for path in (entities.FORCES, entities.SWEEP_UNBALANCE, entities.UNBALANCE_MAP, entities.TRUST):
         assert _contents(tmp_path / "joined.rrd", path) == _contents(tmp_path / "single.rrd", path), path
@@ -60,26 +60,55 @@ class Sent:
         self.rows.append((path, len(next(iter(columns)).as_arrow_array())))
 
 
-def test_rows_are_sent_once_they_are_large_and_points_may_wait(monkeypatch):
+def test_the_most_rows_are_sent_once_all_are_many_and_points_wait(monkeypatch):
     stream = Sent()
     batches = row_batches.RowBatches(stream)
 
-    def add(frame: int) -> None:
+    def add(path: str, frame: int) -> None:
         when = [rr.TimeColumn("frame", sequence=[frame])]
-        batches.add("/rows", when, rr.Scalars.columns(scalars=[1.0]))
+        batches.add(path, when, rr.Scalars.columns(scalars=[1.0]))
 
-    monkeypatch.setattr(row_batches, "LARGEST", 10**9)
-    add(0)
-    one_row = next(iter(batches._rows.values())).size
-    monkeypatch.setattr(row_batches, "LARGEST", 3 * one_row)
-    add(1)
+    monkeypatch.setattr(row_batches, "WAITING", 10**9)
+    add("/rows", 0)
+    one_row = batches._sizes["/rows"]
+    monkeypatch.setattr(row_batches, "WAITING", 4 * one_row)
+    add("/few", 0)
+    add("/rows", 1)
     assert stream.rows == []
-    add(2)
-    assert stream.rows == [("/rows", 3)]
-    add(3)
+    add("/few", 1)
+    assert stream.rows == [("/rows", 2)]
+    add("/rows", 3)
+    assert stream.rows[1:] == []
     batches.begin((("frame", 3),))
     batches.add_point("/curve", [1.0])
-    batches.send(points=False)
-    assert stream.rows[1:] == [("/rows", 1)]
     batches.send()
-    assert stream.rows[2:] == [("/curve", 1)]
+    assert sorted(stream.rows[1:]) == [("/curve", 1), ("/few", 2), ("/rows", 1)]
+    batches.send()
+    assert len(stream.rows) == 4
+
+
+def test_rows_of_one_entity_are_sent_together_in_the_order_in_which_they_were_added(monkeypatch):
+    """Where a row and columns of one frame set the same component, the viewer shows the one that was sent last."""
+    stream = Sent()
+    batches = row_batches.RowBatches(stream)
+    styled = rr.Points2D([[0.0, 0.0]], radii=1.0).as_component_batches()
+    for frame in range(4):
+        batches.begin((("frame", frame),))
+        batches.add_row("/marks", styled)
+        if frame == 1:  # the columns of this frame are the first that are too many
+            monkeypatch.setattr(row_batches, "WAITING", batches._size + 1)
+        batches.add(
+            "/marks", [rr.TimeColumn("frame", sequence=[frame] * 2)], rr.Points2D.columns(positions=[[1.0, 1.0]] * 2)
+        )
+        monkeypatch.setattr(row_batches, "WAITING", 10**9)
+    batches.send()
+    assert [count for _, count in stream.rows] == [2, 4, 2, 4]  # styled rows before columns
+
+
+def test_many_small_rows_are_joined():
+    batches = row_batches.RowBatches(Sent())
+    for frame in range(3 * row_batches.PIECES):
+        batches.begin((("frame", frame),))
+        batches.add_row("/text", rr.TextDocument("text").as_component_batches())
+    (rows_of_path,) = batches._rows["/text"].values()
+    assert all(len(column) < row_batches.PIECES for column in rows_of_path.columns)
