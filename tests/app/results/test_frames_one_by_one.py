@@ -5,10 +5,12 @@ from __future__ import annotations
 import gc
 import pickle
 import tracemalloc
+import weakref
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from rodsight.results.hdf5.lazy_sequences import CachedSequence
 from rodsight.results.hdf5.reader import StoredFrames
 from rodsight.results.hdf5.store import Provenance, load_results, save_results
 
@@ -94,3 +96,36 @@ def test_a_file_that_is_replaced_meanwhile_is_read_as_it_was_opened(stored, full
 def test_frames_can_be_pickled(stored, full):
     found = pickle.loads(pickle.dumps(load_results(stored)))
     assert np.array_equal(found.frames[5].fn, full.frames[5].fn)
+
+
+def test_frames_are_freed_with_their_last_use_and_not_at_a_later_collection(stored):
+    found = load_results(stored).frames
+    cached = CachedSequence(FRAMES, found.__getitem__, lambda _: 1, FRAMES)
+    items = [weakref.ref(found[3].contacts.i), weakref.ref(cached[7].contacts.i)]
+    assert all(item() is not None for item in items)
+    gc.disable()
+    try:
+        del found, cached
+        assert [item() for item in items] == [None, None]
+    finally:
+        gc.enable()
+
+
+def test_kinematics_of_a_frame_are_read_alone_and_are_those_of_all_frames(full, tmp_path, monkeypatch):
+    few = make_full_results()
+    save_results(tmp_path / "results.h5", few, ORIGIN)
+    found, whole = load_results(tmp_path / "results.h5"), few.kinematics
+    read = []
+    original = type(found.read_kinematics._stored)._part
+    monkeypatch.setattr(
+        type(found.read_kinematics._stored), "_part",
+        lambda self, entry, rows: read.append((entry.path, rows)) or original(self, entry, rows),
+    )  # fmt: skip
+    for k in range(len(few.frames)):
+        one, same = found.kinematics_of(slice(k, k + 1)), few.kinematics_of(slice(k, k + 1))
+        for each in fields(whole):
+            np.testing.assert_array_equal(getattr(one, each.name), getattr(same, each.name), each.name)
+        np.testing.assert_array_equal(one.shear_strain[0], whole.shear_strain[k])
+        np.testing.assert_array_equal(one.window_rms, whole.window_rms)
+    one_by_one = [slice(k, k + 1) for k in range(len(few.frames))]
+    assert [rows for path, rows in read if path == "kinematics/fluctuation"] == one_by_one
