@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,15 +138,16 @@ def _decode_alone(content: bytes) -> NDArray | None:
     import cv2  # imported late: given tracks do not need it
 
     # A decoder's messages would appear on standard error beside the single line of an error.
-    level = cv2.utils.logging.getLogLevel()
-    cv2.utils.logging.setLogLevel(0)
+    log: Any = getattr(cv2.utils, "logging", cv2)  # OpenCV 4 has the same functions in its main module
+    level = log.getLogLevel()
+    log.setLogLevel(0)
     try:
         with _without_standard_error():
             return cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:
         return None
     finally:
-        cv2.utils.logging.setLogLevel(level)
+        log.setLogLevel(level)
 
 
 @contextmanager
