@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from ..results.results import Results
 from .figure_style import BLUE, INK, OUTLINE, NothingToDrawError, Width, add_title, new_figure
 from .force_network import bounds_of
-from .kinematics import draw_map
+from .kinematics import SIGNED, draw_map
 
 
 def draw_fringes(results: Results, frame: int, width: Width) -> Figure:
@@ -36,6 +36,6 @@ def draw_fringes(results: Results, frame: int, width: Width) -> Figure:
     curve.legend(fontsize=5.5)
     add_title(curve, f"{results.name}\nr of pressures and fringes {found.correlation[frame]:.2f}")
     value = found.residual[frame] / unit
-    draw_map(residual, results, frame, value, "PuOr", "fringes − forces, over the mean", signed=True)
+    draw_map(residual, results, frame, value, SIGNED, "fringes − forces, over the mean", signed=True)
     add_title(residual, "pressure by the fringes\nminus that by the forces")
     return figure

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from ..results.results import Results
 from ..solver.bodies.grains import Array
@@ -31,6 +32,8 @@ from .force_network import bounds_of, draw_packing
 TOP_QUANTILE = 0.99  # of a quantity over the grains: above it the colour is constant
 LONGEST_ARROW = 2.0  # mean radii, of the rms fluctuation
 SHOWN_WINDOWS = 4  # whose distributions are drawn
+LABELLED = 0.42  # of the width of a map, for its title and its scale
+SIGNED = "cividis"  # blue, grey, yellow: of monotonic lightness, so that signs differ in grey and for everybody
 
 
 def draw_kinematics(results: Results, frame: int, width: Width) -> Figure:
@@ -45,15 +48,19 @@ def draw_kinematics(results: Results, frame: int, width: Width) -> Figure:
     if found is None:
         raise NothingToDrawError("this run has no kinematics: solve it again")
     frame = max(frame, 1)
-    shape = (2, 4) if width == "double" else (4, 2)
+    shape = (1, 4) if width == "double" else (2, 2)
     low, high = bounds_of(results)
-    tall = float((high - low)[1] / (high - low)[0])
-    figure = new_figure(width, 0.3 * tall + 0.36 if width == "double" else 1.2 * tall + 1.0)
-    panels = figure.subplots(*shape, height_ratios=[tall, 1.0] if width == "double" else [tall, tall, 1.0, 1.0]).ravel()
+    tall = float((high - low)[1] / (high - low)[0]) + LABELLED
+    heights = (0.23 * tall, 0.32) if width == "double" else (0.9 * tall, 1.05)
+    figure = new_figure(width, sum(heights))
+    # Maps and curves have margins of their own: those of the curves' labels would make the maps small.
+    grid = figure.add_gridspec(2, 1, height_ratios=heights)
+    parts = [figure.add_subfigure(grid[row]) for row in range(2)]
+    panels = [axes for part in parts for axes in part.subplots(*shape).ravel()]
     maps = (
         (found.shear_strain[frame], "magma_r", "local shear strain", False),
         (np.sqrt(found.d2min[frame]) * 1e6, "viridis_r", "√D²$_{min}$ [µm]", False),
-        (np.degrees(found.rotation[frame]), "PuOr", "rotation [°]", True),
+        (np.degrees(found.rotation[frame]), SIGNED, "rotation [°]", True),
     )
     _draw_fluctuations(panels[0], results, frame, found)
     for axes in panels[:4]:
@@ -66,6 +73,12 @@ def draw_kinematics(results: Results, frame: int, width: Width) -> Figure:
     add_title(panels[3], "rotation minus that\nof the local field")
     _draw_distribution(panels[4], found)
     _draw_correlation(panels[5], found)
+    parts[1].legend(
+        *panels[4].get_legend_handles_labels(),
+        loc="outside upper left",
+        ncols=5 if width == "double" else 2,
+        fontsize=5.5,
+    )
     _draw_growth(panels[6], found, 2.0 * float(results.tracks.radius.mean()))
     _draw_localisation(panels[7], results, found)
     return figure
@@ -89,7 +102,7 @@ def draw_map(axes: Axes, results: Results, frame: int, value: Array, colours: st
         rods, ax=axes, location="bottom", shrink=0.85, aspect=22, pad=0.02, extend="both" if signed else "max"
     )
     bar.set_label(label)
-    bar.ax.locator_params(nbins=3)
+    bar.ax.locator_params(nbins=2)
 
 
 def _draw_fluctuations(axes: Axes, results: Results, frame: int, found: SequenceKinematics) -> None:
@@ -114,11 +127,10 @@ def _shown_windows(found: SequenceKinematics) -> list[int]:
 def _draw_distribution(axes: Axes, found: SequenceKinematics) -> None:
     middle = 0.5 * (FLUCTUATION_EDGES[1:] + FLUCTUATION_EDGES[:-1])
     for w, colour, dash in zip(_shown_windows(found), COLOURS, DASHES, strict=False):
-        label = f"strain {found.window_strain[w]:.1e}"
+        label = f"strain {found.window_strain[w]:.2g}"
         axes.plot(middle, _positive(found.window_density[w]), color=colour, linestyle=dash, label=label)
     axes.plot(middle, np.exp(-0.5 * middle**2) / np.sqrt(2.0 * np.pi), color=INK, linewidth=0.6, label="Gaussian")
     axes.set(yscale="log", ylim=(1e-4, 1.5), xlabel="fluctuation over rms", ylabel="density")
-    axes.legend(fontsize=5.5)
     add_title(axes, "distribution")
 
 
@@ -137,6 +149,7 @@ def _draw_growth(axes: Axes, found: SequenceKinematics, diameter: float) -> None
     with np.errstate(divide="ignore", invalid="ignore"):
         axes.plot(strain, found.window_rms / (diameter * strain), "o-", color=BLUE)
     axes.set(xscale="log", xlabel="strain of the window", ylim=(0.0, None))
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_ylabel("rms / (d · strain)", color=BLUE)
     other = axes.twinx()
     other.plot(strain, found.window_kurtosis, "s--", color=VERMILION)

@@ -30,6 +30,7 @@ from .rounding import rounded, rounded_one
 CROP_WIDTHS = (4.4, 2.2, 1.0)  # width of the magnified crop in mean grain diameters, one for each zoom
 KEPT_FRAMES = 16  # whose candidate pairs and queues stay in memory
 MOST_LISTED = 5000  # candidate pairs in the list of a frame
+DIGITS = 5  # of the direction of a pair
 _OUTCOMES = {Verdict.CONTACT: YES, Verdict.NO_CONTACT: NO, Verdict.UNSURE: UNJUDGED}
 _ESTIMATE_SEED = 7  # the same verdicts give the same interval
 
@@ -226,13 +227,14 @@ class ReviewSession:
         )
         # measure_pairs sorts its pairs by key
         row = np.searchsorted(pairs.key, keys)
-        place = self.scale.to_pixels(pairs.point[row]).round(2)
+        place = self.scale.to_pixels(pairs.point[row]).round(2).tolist()
+        normal = (pairs.normal[row] * (1.0, -1.0)).round(DIGITS).tolist()  # y down
         listed: list[dict[str, Any]] = []
         for k, at in enumerate(row.tolist()):
             verdict = verdicts.get(int(keys[k]))
             listed.append({
                 "i": self.bodies.name(int(pairs.i[at])), "j": self.bodies.name(int(pairs.j[at])),
-                "point": place[k].tolist(), "normal": [float(pairs.normal[at, 0]), -float(pairs.normal[at, 1])],
+                "point": place[k], "normal": normal[k],
                 "verdict": None if verdict is None else verdict.value,
             })  # fmt: skip
         if not view.blind:

@@ -134,6 +134,8 @@ def _draw_density(axes: Axes, results: Results, truth: TruthContacts | None) -> 
 
 def _draw_rods(axes: Axes, results: Results, frame: int, picture: Picture | None) -> None:
     for line in outlines(results.walls.endpoints[frame], results.walls.side):
+        if picture is not None:  # a photograph is dark here and bright there
+            axes.plot(*line.T, color="white", linewidth=2.0, zorder=2)
         axes.plot(*line.T, color=INK if picture is None else VERMILION, linewidth=0.7, zorder=2)
     if picture is not None:
         axes.imshow(picture.grey, cmap="gray", extent=picture.extent, origin="upper", zorder=0)

@@ -25,8 +25,8 @@ INFERRED: Rgba = (96, 168, 255, 255)  # a rod that no photograph shows
 NEW_CONTACT: Rgba = (112, 250, 147, 255)
 ADDED: Rgba = (196, 130, 255, 255)  # by a reviewer
 FORBIDDEN: Rgba = (255, 214, 80, 255)  # by a reviewer
-# Curves: CIE76 differences of 25 and more under all kinds of colour blindness, of the first and the last two in grey.
-SERIES: tuple[Rgba, ...] = ((255, 202, 87, 255), (90, 133, 250, 255), (174, 252, 163, 255), (219, 121, 206, 255))
+# Curves: CIE76 differences of 33 and more under all kinds of colour blindness, steps of 13 in lightness for grey.
+SERIES: tuple[Rgba, ...] = ((216, 198, 65, 255), (28, 122, 250, 255), (155, 255, 180, 255), (229, 129, 176, 255))
 
 # Signed quantities: lightness is monotonic, so that less and more differ without hue.
 # Overlap cream, touching orange, open blue.

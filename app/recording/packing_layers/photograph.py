@@ -9,7 +9,7 @@ from ..look import entities
 from ..look.canvas import Canvas
 from ..look.clock import Clock
 
-OPACITY = 0.3  # over the dark background of the views
+OPACITY = 0.2  # over the dark background of the views
 
 
 def log_photograph(clock: Clock, canvas: Canvas, photograph: JpegPhotograph) -> None:

@@ -36,7 +36,8 @@ def fit_clicked(image: Image, drawn: Circle, sizes: Sequence[float] = ()) -> Cir
         Centre and radius [px]; None where no rim is seen. A circle drawn by hand can miss the rim by more than the
         refinement corrects, above all on a large photograph: it is then detected around the click.
     """
-    x, y, radius = drawn
+    x, y = drawn[:2]
+    radius = min(drawn[2], float(max(image.shape)))
     around = AROUND * max([radius, *sizes])
     left, top = (max(int(each - around), 0) for each in (x, y))
     part = image[top : int(y + around) + 1, left : int(x + around) + 1]

@@ -157,7 +157,7 @@ app.tool = (tool) => app.stage.use(tool);
 app.home = () => {
   app.step.leave?.(app);
   app.project = null;
-  app.stage.draw = app.stage.fixed = () => {}; // the drawing of a step needs its project
+  app.stage.draw = app.stage.fixed = () => {}; app.stage.waits = () => false; // the drawing of a step needs its project
   if (location.hash) location.hash = "";
   document.body.classList.add("at-home");
   for (const id of ["steps", "panel", "time"]) at(id).replaceChildren();
@@ -218,6 +218,7 @@ app.paint = () => {
   const edited = app.edits(), hint = step.hint?.(app) ?? "";
   app.hint(edited === null || project.tracked ? hint : [`Photograph ${edited}`, hint].filter(Boolean).join(" · "));
   app.stage.draw = (c, k) => { if (step.below) drawSetup(app, c, k, step.below); if (step.layered) step.draw?.(app, c, k); else paintLayer(c, "marks", () => step.draw?.(app, c, k)); };
+  app.stage.waits = () => Boolean(step.waits?.(app));
   app.stage.fixed = (c, k) => step.legend?.(app, c, k); // stays where it is when the picture is moved
   app.stage.dim = step.dim ?? 1;
   const beside = app.step.frames || app.step.timeline ? [app.frame + 1, app.frame - 1].filter((each) => project.files[each]) : [];

@@ -22,7 +22,7 @@ export class Stage {
     this.view = { x: 0, y: 0, k: 1 };
     this.picture = new Picture(at("photograph"), () => this.shift());
     this.wanted = ""; this.width = 0; this.height = 0;
-    this.draw = () => {}; this.fixed = () => {}; this.tool = {}; this.loupe = false; this.mouse = null;
+    this.draw = () => {}; this.waits = () => false; this.fixed = () => {}; this.tool = {}; this.loupe = false; this.mouse = null;
     this.pending = false; this.drawn = 0; this.fitted = ""; this.idle = 0;
     this.drawing = { canvas: at("drawing"), view: null, stale: true, settling: 0 };
     this.window = [0, 0, 0, 0]; // [px] left, top, right, bottom of what is being drawn
@@ -128,7 +128,9 @@ export class Stage {
 
   /** Draw the step anew, with a margin. */
   renew(dense) {
-    const { drawing, view } = this, { canvas } = drawing;
+    const { drawing, view } = this, { canvas } = drawing, waits = this.waits();
+    canvas.style.visibility = waits ? "hidden" : "";
+    if (waits && drawing.view) { drawing.stale = false; return; } // a canvas that is hidden need not be emptied
     const wide = Math.round((1 + 2 * MARGIN) * this.boxWidth * dense), high = Math.round((1 + 2 * MARGIN) * this.boxHeight * dense);
     if (canvas.width !== wide || canvas.height !== high) { canvas.width = wide; canvas.height = high; }
     const c = canvas.getContext("2d"), left = view.x - MARGIN * this.boxWidth / view.k, top = view.y - MARGIN * this.boxHeight / view.k;

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import ctypes
+import gc
 import json
 import socket
 from collections.abc import AsyncIterator, Callable
@@ -17,6 +18,7 @@ from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import Any, cast
 
+from pydantic_core import PydanticSerializationError, to_json
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
@@ -168,6 +170,7 @@ class WorkbenchServer:
 
     def serve(self) -> None:
         """Serve until shutdown is called, or until the user interrupts."""
+        gc.freeze()  # imported objects stay: each search for cycles among them would delay an answer by .1 s
         self._server.run(sockets=[self._socket])
 
     def shutdown(self) -> None:
@@ -229,7 +232,12 @@ class _Json(JSONResponse):
     """An answer in which characters that are no UTF-8, as of a file's name, are replaced."""
 
     def render(self, content: Any) -> bytes:
-        return json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode(errors="replace")
+        try:
+            return to_json(content, inf_nan_mode="null")  # five times as fast as Python's own
+        except (PydanticSerializationError, UnicodeEncodeError):
+            return json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode(
+                errors="replace"
+            )
 
 
 def _plain(text: str) -> str:

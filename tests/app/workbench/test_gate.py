@@ -3,6 +3,7 @@
 import os
 
 import pytest
+from rodsight.workbench.service.server import _Json
 from rodsight.workbench.service.workbench import Workbench
 from rodsight.workbench.setup.draft import Draft
 from starlette.testclient import TestClient
@@ -195,3 +196,14 @@ def test_the_cookie_of_one_server_opens_no_other(outsider, tmp_path):
     other = Visitor(Workbench(tmp_path))
     other.client.cookies = outsider.client.cookies
     assert other.client.get("/").status_code == 403
+
+
+@pytest.mark.parametrize(
+    ("content", "body"),
+    [
+        ({"r": [0.25, float("nan")], "name": "März"}, '{"r":[0.25,null],"name":"März"}'),
+        ({"file": "a\udcff.png"}, '{"file":"a?.png"}'),  # not UTF-8
+    ],
+)
+def test_every_answer_is_json_that_a_browser_reads(content, body):
+    assert _Json(content).body.decode() == body

@@ -122,7 +122,7 @@ export function rodLegends(net, motions) {
 export function drawRods(c, k, stage, net) {
   const sure = [], unsure = [], { x, y, r, angle, status } = net.rods;
   x.forEach((_, n) => { if (stage.sees(x[n], y[n], r[n])) (status[n] === "suspect" || status[n] === "interpolated" ? unsure : sure).push([x[n], y[n], r[n], angle[n]]); });
-  paintLayer(c, "rods", () => { strokeCircles(c, k, sure, "#ced4e0a0", 1, { under: "#0000" }); strokeCircles(c, k, unsure, "#f0e442", 1.8, { dash: [6, 4] }); });
+  paintLayer(c, "rods", () => { strokeCircles(c, k, sure, "#ced4e0a0", 1, { under: null }); strokeCircles(c, k, unsure, "#f0e442", 1.8, { dash: [6, 4] }); });
 }
 
 /** Walls as the photograph shows them. */

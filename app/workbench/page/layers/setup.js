@@ -12,7 +12,7 @@ export function drawSetup(app, c, k, names) {
   const { walls, rods, photographs } = app.project;
   const first = app.frame === 0; // rods and walls are marked on it
   if (names.includes("mask")) paintLayer(c, "mask", () => drawMask(app, c, k, photographs.region));
-  if (names.includes("rods") && rods && first) paintLayer(c, "rods", () => strokeCircles(c, k, rods.id.map((_, n) => [rods.x[n], rods.y[n], rods.r[n]]).filter((each) => app.stage.sees(...each)), "#ced4e0a0", 1, { under: "#0000" }));
+  if (names.includes("rods") && rods && first) paintLayer(c, "rods", () => strokeCircles(c, k, rods.id.map((_, n) => [rods.x[n], rods.y[n], rods.r[n]]).filter((each) => app.stage.sees(...each)), "#ced4e0a0", 1, { under: null }));
   if (names.includes("walls") && walls.length && first) drawWalls(c, k, walls.map(({ line, circle }) => (circle ? rim(circle) : line)));
 }
 

@@ -47,6 +47,7 @@ export const inspect = {
       chosen || !facts.camera ? null : h("p", { id: "camera", class: "hint" }, `Camera and radii: ${facts.camera}.`),
     ];
   },
+  waits: (app) => net?.frame !== app.frame,
   draw(app, c, k) {
     if (!net || net.frame !== app.frame) return;
     const { stage } = app, motions = motionOf(app, facts);

@@ -55,7 +55,7 @@ export const review = {
     if (!frame || frame.frame !== app.frame) return;
     const { rods } = frame, radius = meanRadius();
     if (state.outlines || !app.project.files.length) {
-      strokeCircles(c, k, rods.x.map((x, n) => [x, rods.y[n], rods.r[n]]).filter((each) => app.stage.sees(...each)), OUTLINE, 1, { under: "#0000" });
+      strokeCircles(c, k, rods.x.map((x, n) => [x, rods.y[n], rods.r[n]]).filter((each) => app.stage.sees(...each)), OUTLINE, 1, { under: null });
       c.strokeStyle = OUTLINE; c.lineWidth = 2 / k;
       for (const wall of frame.walls) { c.beginPath(); wall.forEach(([x, y], n) => (n ? c.lineTo(x, y) : c.moveTo(x, y))); c.stroke(); }
     }

@@ -26,6 +26,7 @@ from tests.app.recording.look.colour_vision import VISIONS, cie76
 
 MIN_DIFFERENCE = 25.0
 LABELLED_DIFFERENCE = 20.0  # in grey, beside a text of the same meaning
+STEP_IN_GREY = 12.0  # between two curves of a view
 GROUPS = {
     "curves": SERIES,
     "status": tuple(STATUS_COLOURS.values()),
@@ -72,6 +73,10 @@ def test_zero_is_grey_between_less_and_more():
 @pytest.mark.parametrize("pair", [(SERIES[0], SERIES[1]), (SERIES[2], SERIES[3]), (NEW_CONTACT, LOST)])
 def test_the_most_frequent_pairs_differ_in_grey(pair):
     assert cie76(*pair, "grey") >= MIN_DIFFERENCE
+
+
+def test_curves_differ_in_grey():
+    assert min(cie76(*pair, "grey") for pair in combinations(SERIES, 2)) >= STEP_IN_GREY
 
 
 @pytest.mark.parametrize("status", [FrameStatus.SUSPECT, FrameStatus.REARRANGING, FrameStatus.FAILED])
