@@ -8,7 +8,9 @@ from scipy.spatial import ConvexHull, KDTree
 
 from ..process.errors import InputError
 from ..solver.bodies.grains import Array
-from ..solver.bodies.wall_shapes import IN, OUT, STRAIGHT, beside_wall, wall_distance
+from ..solver.bodies.wall_shapes import IN, OUT, STRAIGHT, beside_wall, bounding_distance, wall_distance
+from ..solver.boundary.continuation import bearing_past_ends
+from ..solver.calibration.gaps import MeasuredSequence
 from ..tracks import Tracks, WallTracks
 from .boundary import free_surfaces
 from .experiment import Experiment
@@ -17,8 +19,6 @@ NEIGHBOURS = 8  # nearest centres of a grain, which include the one closest in u
 SPACING = (0.93, 1.15)  # of neighbours over their radii, median: packed rods touch, whatever the noise
 GREATEST_RADIUS = 0.5  # [m] of a rod
 GREATEST_FRACTION = 2.0  # of the packing's diagonal: no radius is larger
-NEAR = 0.05  # radii between a rod and a wall's line, at most, for the rod to touch it
-BEYOND = 0.5  # radii past a wall's end
 MISTAKE_TOLERANCE = 0.15  # relative difference between a spacing and that of a known mistake, at most
 STRENGTH = 1e8  # [Pa] mean stress: contacts of rods then carry several times that, and metals yield
 OPEN = 1e-6  # [rad] two parallel walls face each other within this
@@ -180,22 +180,16 @@ def rods_beyond_ends(tracks: Tracks, walls: WallTracks) -> list[str]:
 
     Either the wall was measured too short, which does no harm, or these rods touch no wall and their forces are wrong.
     """
-    start = walls.endpoints[:, :, 0]
-    along = walls.endpoints[:, :, 1] - start
-    length = np.linalg.norm(along, axis=-1)  # (f, w)
-    unit = along / length[..., None]
+    nothing = np.zeros(tracks.position.shape[:2])
+    sequence = MeasuredSequence(
+        tracks.radius, tracks.position, nothing, tracks.present, walls.endpoints, nothing, walls.side
+    )
     sentences = []
-    for w, name in ((w, walls.name[w]) for w in np.flatnonzero(walls.sides == STRAIGHT)):
-        place = tracks.position - start[:, None, w]
-        ahead = np.einsum("fnk,fk->fn", place, unit[:, w])
-        inside = place[..., 1] * unit[:, None, w, 0] - place[..., 0] * unit[:, None, w, 1]
-        near = np.abs(inside - tracks.radius) < NEAR * tracks.radius  # NaN of lost grains compares false
-        past = np.maximum(-ahead, ahead - length[:, None, w]) > BEYOND * tracks.radius
-        rods = int((near & past).any(axis=0).sum())
+    for w, rods in enumerate(bearing_past_ends(sequence).sum(axis=0).tolist()):
         if rods:
             sentences.append(
-                f"{rods} rod{'s' if rods > 1 else ''} may touch the line of wall {name!r} beyond its end: the wall is "
-                "continued along them, unless calibration.walls_continue is false"
+                f"{rods} rod{'s' if rods > 1 else ''} may touch the line of wall {walls.name[w]!r} beyond its end: the "
+                "wall is continued along them, unless calibration.walls_continue is false"
             )
     return sentences
 
@@ -226,8 +220,9 @@ def check_inside(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> N
     section = experiment.config.walls
     if section is None:
         return
+    depth = -bounding_distance(walls.endpoints[:, None], walls.sides, tracks.position)[0]
     for w, name in enumerate(walls.name):
-        beyond = -wall_distance(walls.endpoints[:, None, w], walls.sides[w : w + 1], tracks.position)[0]
+        beyond = depth[..., w]
         outside = np.argwhere(beyond > tracks.radius)  # NaN of lost grains compares false
         if len(outside):
             k, row = (int(v) for v in outside[0])

@@ -27,7 +27,7 @@ from ..process.frame_range import FrameRange
 from ..process.progress import Progress, no_progress
 from ..results.checkpoint import Checkpoint
 from ..solver.bodies.grains import Array
-from ..solver.bodies.wall_shapes import OUT, STRAIGHT, wall_distance
+from ..solver.bodies.wall_shapes import OUT, STRAIGHT, bounding_distance
 from ..tracks import Tracks, WallTracks
 from . import DETECTIONS, PICTURES
 from .corner_discs import CORNERS, follow_corners
@@ -261,7 +261,7 @@ def _inside_walls(position: Array, walls: WallTracks) -> NDArray[np.bool_]:
 
     Walls that would exclude nearly all grains have the wrong direction; a later check reports that, with all grains.
     """
-    depth, _ = wall_distance(walls.endpoints[0], walls.sides, position[:, None])
+    depth, _ = bounding_distance(walls.endpoints[0], walls.sides, position)
     within = np.asarray((depth > 0.0).all(axis=1))
     return within if within.sum() > 0.2 * len(within) else np.ones_like(within)
 

@@ -14,6 +14,7 @@ from .grains import Array
 
 STRAIGHT, IN, OUT = 0, 1, -1  # shape of a wall: straight, or a circle with the packing inside or outside
 CORNERS = 72  # of the polygon that draws a circle
+ALIKE = 0.9  # cosine of the greatest angle of two walls that face the same way
 Sides = NDArray[np.int8] | None
 
 
@@ -101,6 +102,68 @@ def beside_wall(endpoints: Array, side: Sides, point: Array, margin: Array) -> N
     s = np.einsum("...k,...k->...", point - endpoints[..., 0, :], along / length[..., None])
     beside = (s > -margin) & (s < length + margin)
     return beside if side is None else beside | (side != STRAIGHT)
+
+
+def faces_walls(endpoints: Array, side: Sides, point: Array, margin: Array) -> NDArray[np.bool_]:
+    """Return which walls grains can touch.
+
+    Parameters
+    ----------
+    endpoints : (w, 2, 2)
+        Walls [m].
+    side : (w,)
+        Shapes of the walls.
+    point : (n, 2)
+        Centres [m].
+    margin : (n,)
+        Distance [m] past an end within which a straight wall is taken to go on.
+
+    Returns
+    -------
+    (n, w)
+        True beside a wall. Past its end within the margin it is True unless the grain is beside another wall that faces
+        the same way, as in a box that is split.
+    """
+    walls, place, shape = endpoints[None], point[:, None], None if side is None else side[None]
+    beside = beside_wall(walls, shape, place, np.zeros((len(point), 1)))
+    near = beside_wall(walls, shape, place, margin[:, None])
+    straight = all_sides(side, len(endpoints)) == STRAIGHT
+    outward = np.where(straight[:, None], outward_normals(endpoints), 0.0)
+    alike = (outward @ outward.T > ALIKE) & ~np.eye(len(endpoints), dtype=bool)
+    if not alike.any():
+        return near
+    return beside | (near & ~(beside.astype(np.float64) @ alike > 0.0))
+
+
+def bounding_distance(endpoints: Array, side: Sides, point: Array) -> tuple[Array, Array]:
+    """Return the distance of points from the walls that bound them, and the outward normals there.
+
+    A bar ends: what is past its end and beyond its line may be inside the packing, as rods are beside a footing or in
+    the other half of a box that is split. It is outside only if it is beyond another wall, too, or farther beyond than
+    the bar is long.
+
+    Parameters
+    ----------
+    endpoints : (…, w, 2, 2)
+        Walls [m].
+    side : (w,)
+        Shapes of the walls.
+    point : (…, 2)
+        Points [m].
+
+    Returns
+    -------
+    distance : (…, w)
+        As `wall_distance`; infinite from a straight wall that does not bound the point.
+    normal : (…, w, 2)
+        Outward unit normals.
+    """
+    place = point[..., None, :]
+    distance, normal = wall_distance(endpoints, side, place)
+    past = ~beside_wall(endpoints, side, place, np.zeros(distance.shape))
+    alone = (distance < 0.0).sum(axis=-1, keepdims=True) == 1
+    length = np.linalg.norm(endpoints[..., 1, :] - endpoints[..., 0, :], axis=-1)
+    return np.where(past & alone & (distance < 0.0) & (distance > -length), np.inf, distance), normal
 
 
 def wall_displacement(former: Array, later: Array, side: Sides, at: Array | None = None) -> Array:

@@ -2,43 +2,97 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ..bodies.grains import Array
-from ..bodies.wall_shapes import STRAIGHT, all_sides, outward_normals
+from ..bodies.wall_shapes import ALIKE, STRAIGHT, all_sides, beside_wall, outward_normals
 from ..calibration.gaps import MeasuredSequence
 
 CONTACT_DISTANCE = 0.05  # radii: greatest distance of a rod's surface from the line of a wall that it bears on
 PAST_END = 0.5  # radii: rods nearer to an end bear on the given wall
 NEIGHBOUR_DISTANCE = 1.0  # radii: a wall is extended along rods whose surface is this near to its line
 PARALLEL = 0.1  # sine of the least angle of two walls that meet
+ACROSS, NEAR_END = 0.5, 4.0  # radii: greatest distance of a centre from a line that the rod crosses, and from the end
 
 
 def continue_walls(sequence: MeasuredSequence) -> Array:
     """Compute the extension (w, 2) [m] of each wall beyond its ends, zero where it is long enough.
 
     A wall is extended only where a rod bears on its line beyond the end: past the last rod beside the line in any
-    frame, but not beyond the line of another wall.
+    frame, but not beyond the line of another wall. It is long enough where a rod stands across its line past the end,
+    as beside a footing, and along rods that are beside another wall which faces the same way, as in a split box.
     """
-    ends = sequence.endpoints
-    normal = outward_normals(ends)
-    along = np.stack([-normal[..., 1], normal[..., 0]], axis=-1)
-    length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+    ends, straight = sequence.endpoints, _straight(sequence)
+    along = _along(outward_normals(ends))
     extension = np.zeros((sequence.wall_count, 2))
-    straight = np.flatnonzero(all_sides(sequence.side, sequence.wall_count) == STRAIGHT)
-    for at, w in enumerate(straight.tolist()):
+    for past in _past_ends(sequence):
+        reach = np.where(past.near, past.distance + sequence.radius, 0.0).max(axis=1)
+        at = straight.tolist().index(past.wall)
+        limit = _distance_to_next_wall(ends[:, straight], along[:, straight], at, past.end)
+        extension[past.wall, past.end] = np.minimum(reach, limit).max()
+    return extension
+
+
+def bearing_past_ends(sequence: MeasuredSequence) -> NDArray[np.bool_]:
+    """Return which grains (n, w) bear on the line of a wall past its end in any frame."""
+    found = np.zeros((len(sequence.radius), sequence.wall_count), bool)
+    for past in _past_ends(sequence):
+        found[:, past.wall] |= past.bears.any(axis=0)
+    return found
+
+
+class _PastEnd(NamedTuple):
+    """Grains (f, n) past an end of a wall that continues there."""
+
+    wall: int
+    end: int
+    distance: Array  # [m] from the end, along the wall
+    bears: NDArray[np.bool_]  # touch the wall's line
+    near: NDArray[np.bool_]  # are beside it
+
+
+def _past_ends(sequence: MeasuredSequence) -> Iterator[_PastEnd]:
+    """Yield every end past which rods bear on the line of the wall."""
+    ends, radius = sequence.endpoints, sequence.radius
+    normal = outward_normals(ends)
+    along = _along(normal)
+    length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+    beside_another = _beside_another(sequence, normal)
+    for w in _straight(sequence).tolist():
         offset = sequence.position - ends[:, None, w, 0]
         place = np.einsum("fnk,fk->fn", offset, along[:, w])
-        off = np.abs(-np.einsum("fnk,fk->fn", offset, normal[:, w]) - sequence.radius) / sequence.radius
+        depth = -np.einsum("fnk,fk->fn", offset, normal[:, w])
+        free = sequence.present & ~beside_another[..., w]
         for end, past in enumerate((-place, place - length[:, None, w])):
             with np.errstate(invalid="ignore"):
-                bears = sequence.present & (off < CONTACT_DISTANCE) & (past > PAST_END * sequence.radius)
-                rods = sequence.present & (off < NEIGHBOUR_DISTANCE) & (past > 0.0)
-            if bears.any():
-                reach = np.where(rods, past + sequence.radius, 0.0).max(axis=1)
-                limit = _distance_to_next_wall(ends[:, straight], along[:, straight], at, end)
-                extension[w, end] = np.minimum(reach, limit).max()
-    return extension
+                off = np.abs(depth - radius)
+                bears = free & (off < CONTACT_DISTANCE * radius) & (past > PAST_END * radius)
+                near = free & (off < NEIGHBOUR_DISTANCE * radius) & (past > 0.0)
+                close = (past > radius) & (past < NEAR_END * radius)
+                across = free & close & (np.abs(depth) < ACROSS * radius)
+            if bears.any() and not across.any():
+                yield _PastEnd(w, end, past, bears, near)
+
+
+def _straight(sequence: MeasuredSequence) -> NDArray[np.intp]:
+    return np.flatnonzero(all_sides(sequence.side, sequence.wall_count) == STRAIGHT)
+
+
+def _along(normal: Array) -> Array:
+    return np.stack([-normal[..., 1], normal[..., 0]], axis=-1)
+
+
+def _beside_another(sequence: MeasuredSequence, normal: Array) -> NDArray[np.bool_]:
+    """Which grains (f, n, w) are beside another straight wall that faces the same way as wall w."""
+    side = all_sides(sequence.side, sequence.wall_count)
+    beside = beside_wall(sequence.endpoints[:, None], None, sequence.position[:, :, None], np.zeros(1))
+    beside &= side == STRAIGHT
+    alike = (np.einsum("fwk,fvk->fwv", normal, normal) > ALIKE) & ~np.eye(sequence.wall_count, dtype=bool)
+    return np.einsum("fnv,fwv->fnw", beside.astype(np.float64), alike.astype(np.float64)) > 0.0
 
 
 def extend_walls(endpoints: Array, extension: Array) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..bodies.cell import Cell, reduce_vectors
 from ..bodies.disc_pairs import find_disc_pairs
 from ..bodies.grains import Array
-from ..bodies.wall_shapes import STRAIGHT, Sides, all_sides, beside_wall, wall_distance
+from ..bodies.wall_shapes import STRAIGHT, Sides, all_sides, faces_walls, wall_distance
 
 TINY = 1e-300  # [m] avoids division by a distance of zero
 
@@ -195,9 +195,8 @@ def _pairs_of_frame(sequence: MeasuredSequence, k: int, reach: float, wall_reach
     walls, side = sequence.endpoints[k][None], all_sides(sequence.side, sequence.wall_count)[None]
     place, margin = position[rows, None], radius[rows, None]
     gap = wall_distance(walls, side, place)[0] - margin
-    # A grain meets a straight wall only beside it, give or take its radius.
-    beside = beside_wall(walls, side, place, margin) & (gap > -margin)
-    grain, wall = np.nonzero(beside & (gap < wall_reach))
+    faces = faces_walls(walls[0], side[0], position[rows], radius[rows])
+    grain, wall = np.nonzero(faces & (gap > -margin) & (gap < wall_reach))
     return np.concatenate([i, rows[grain]]), np.concatenate([j, wall + sequence.grain_count])
 
 

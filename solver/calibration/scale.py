@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bodies.grains import Array
-from ..bodies.wall_shapes import OUT, STRAIGHT, Sides, all_sides, circle_ends, circle_parameters, wall_distance
+from ..bodies.wall_shapes import OUT, STRAIGHT, Sides, all_sides, bounding_distance, circle_ends, circle_parameters
 from .gaps import MeasuredSequence, find_gap_rows, measure_gaps
 from .priors import CalibrationPriors
 
@@ -334,7 +334,7 @@ def _misfit(sequence: MeasuredSequence) -> float:
 def _median_gaps(sequence: MeasuredSequence) -> Array:
     """Return the median over photographs of the gap (w,) [m] of the nearest grain of every wall."""
     side = all_sides(sequence.side, sequence.wall_count)
-    depth, _ = wall_distance(sequence.endpoints[:, None], side, sequence.position[:, :, None])
+    depth, _ = bounding_distance(sequence.endpoints[:, None], side, sequence.position)
     gap = depth - sequence.radius[:, None]
     gap = np.where(sequence.present[..., None], gap, np.inf)
     return np.median(gap.min(axis=1), axis=0)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..bodies.cell import Cell
 from ..bodies.disc_pairs import find_disc_pairs
 from ..bodies.grains import Array, Grains
-from ..bodies.wall_shapes import Sides, beside_wall, distance_from_walls
+from ..bodies.wall_shapes import Sides, distance_from_walls, faces_walls
 from ..bodies.walls import Walls
 from ..quantity import Quantity
 from .pairs import Keys, make_keys, split_keys
@@ -203,12 +203,11 @@ def _with_images(cell: Cell, position: Array, rows: NDArray[np.intp], reach: flo
 def _wall_pairs(
     radius: Array, position: Array, present: NDArray[np.bool_], walls: Walls, threshold: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Find pairs of grain and wall; the centre must project onto a straight wall, within one radius of its ends."""
+    """Find pairs of grain and wall; the grain must face the wall, which goes on for one radius past its ends."""
     gap = distance_from_walls(walls.endpoints[None], _row(walls.side), position[:, None]) - radius[:, None]
-    i, w = np.nonzero((gap < threshold) & (gap > -radius[:, None]) & present[:, None])
-    side = None if walls.side is None else walls.side[w]
-    beside = beside_wall(walls.endpoints[w], side, position[i], radius[i])
-    return i[beside], w[beside]
+    near = (gap < threshold) & (gap > -radius[:, None]) & present[:, None]
+    i, w = np.nonzero(near & faces_walls(walls.endpoints, walls.side, position, radius))
+    return i, w
 
 
 def _row(side: Sides) -> Sides:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from ..bodies.grains import Array
-from ..bodies.wall_shapes import IN, STRAIGHT, Sides, all_sides, circle_parameters, wall_distance
+from ..bodies.wall_shapes import IN, STRAIGHT, Sides, all_sides, bounding_distance, circle_parameters
 
 NEIGHBOURS = 8  # whose mean motion a place follows
 NEAREST = 12  # centres that are tested for contact with a rod
@@ -154,7 +154,8 @@ class Surroundings:
         """Return centres (b, 2) and radii (b,) [m] of grains with rims within reach of a place and of all walls."""
         rows = self._rows[k][self._tree[k].query_ball_point(place, reach + self._widest)]
         depth, outward = self._reach(k, place[None])
-        flat = self._flat(depth[0], outward[0], np.broadcast_to(place, outward[0].shape))
+        bounds = np.isfinite(depth[0])
+        flat = self._flat(depth[0, bounds], outward[0, bounds], np.broadcast_to(place, (int(bounds.sum()), 2)))
         return (
             np.concatenate([self.position[k][rows], flat]),
             np.concatenate([self.radius[rows], np.full(len(flat), FLAT * self._widest)]),
@@ -162,7 +163,7 @@ class Surroundings:
 
     def _reach(self, k: int, place: Array) -> tuple[Array, Array]:
         """Compute distances (p, w) [m] of places (p, 2) from the walls in photograph k, and outward normals."""
-        return wall_distance(self._walls[k][None], self._side[None], place[:, None])
+        return bounding_distance(self._walls[k], self._side, place)
 
     def _flat(self, depth: Array, outward: Array, near: Array) -> Array:
         """Compute centres (m, 2) of large circles that replace the wall at `depth` (m,) [m] beyond places (m, 2)."""

@@ -9,7 +9,7 @@ from ...results.finding import Finding
 from ...solver.bodies.grains import Array, Grains
 from ...solver.bodies.rods import RodMaterial
 from ...solver.bodies.strain import displacement_gradient, inertial_time, shear_strain
-from ...solver.bodies.wall_shapes import STRAIGHT
+from ...solver.bodies.wall_shapes import STRAIGHT, beside_wall, distance_from_walls
 from ...solver.contacts.contacts import detect_contacts
 from ...solver.inferred.unknown_rotations import fill_unknown_rotations
 from ...solver.statistics.agreement import pearson, ranks
@@ -282,12 +282,11 @@ def _shortened_by_sorting(tracks: Tracks, step: Array) -> float:
 def _near_gap(
     tracks: Tracks, walls: WallTracks, k: int, w: int, at: int | None = None, *, nearest: int = NEAREST
 ) -> float:
-    """Gap [m] between a wall and one of the nearest rods; at: photograph of the wall, k by default."""
-    here = tracks.present[k]
-    if here.sum() < nearest:
+    """Gap [m] between a wall and one of the nearest rods beside it; at: photograph of the wall, k by default."""
+    here = np.flatnonzero(tracks.present[k])
+    ends = walls.endpoints[k if at is None else at, w]
+    here = here[beside_wall(ends, None, tracks.position[k, here], np.zeros(len(here)))]
+    if len(here) < nearest:
         return np.nan
-    (a, b) = walls.endpoints[k if at is None else at, w]
-    along = (b - a) / np.linalg.norm(b - a)
-    normal = np.array([-along[1], along[0]])
-    gap = (tracks.position[k, here] - a) @ normal - tracks.radius[here]
+    gap = distance_from_walls(ends, None, tracks.position[k, here]) - tracks.radius[here]
     return float(np.sort(gap)[nearest - 1])

@@ -142,6 +142,13 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
         "loaded and unloaded from two sides between 1 and 3 times 50 kPa; no pressure is stated",
         LoadingPath(load_isotropically, 0.0),
     ),
+    "rising_loads": Scenario(
+        "loaded and unloaded from two sides between 1 and 3 times 50 kPa, both loads measured; contacts ten times as "
+        "stiff, so that almost nothing slides",
+        LoadingPath(
+            load_isotropically, 0.0, measured=("top", "right"), settings=DemSettings(normal_stiffness=2e8)
+        ),
+    ),
     "gravity": Scenario(
         "a heap with a free surface, pushed by its right wall; no plate",
         LoadingPath(push_heap, 0.002, settings=HEAP, open_top=True),

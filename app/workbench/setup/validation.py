@@ -33,7 +33,7 @@ from ...experiment.scaling import make_scale
 from ...experiment.units import Scale
 from ...experiment.walls import read_walls
 from ...process.errors import InputError
-from ...solver.bodies.wall_shapes import wall_distance
+from ...solver.bodies.wall_shapes import bounding_distance
 from ...tracks import Tracks, TrackStatus, WallTracks
 from .draft import Draft
 from .photograph_checks import LISTED, compare_with_camera, name_missing, unusable
@@ -324,7 +324,7 @@ def outside_walls(found: ValidationResult) -> list[int]:
     if found.rods is None or found.walls is None or found.scale is None:
         return []
     place = found.scale.to_world(np.stack([found.rods.x, found.rods.y], axis=1))
-    distance, _ = wall_distance(found.walls.endpoints[0], found.walls.sides, place[:, None])
+    distance, _ = bounding_distance(found.walls.endpoints[0], found.walls.sides, place)
     outside = np.asarray((distance < 0.0).any(axis=1))
     return found.rods.id[outside].tolist() if outside.mean() < MOSTLY else []
 

@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
-from rodsight.experiment.plausibility import expected_rods, neighbour_spacing, rods_beyond_ends, rods_cut_by_walls
+from rodsight.experiment.plausibility import (
+    check_inside,
+    expected_rods,
+    neighbour_spacing,
+    rods_beyond_ends,
+    rods_cut_by_walls,
+)
+from rodsight.process.errors import InputError
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
 RADIUS = 0.01  # [m]
@@ -57,3 +67,13 @@ def test_walls_through_rods_are_named() -> None:
     assert rods_cut_by_walls(tracks_at(place), floor(0.1)) == {}
     low = place - [0.0, 0.009]
     assert rods_cut_by_walls(tracks_at(low), floor(0.06)) == {"floor": 2}
+
+
+def test_rods_in_the_other_half_of_a_split_box_are_not_beyond_its_side() -> None:
+    halves = np.array([[[[0.2, 0.0], [0.2, 0.1]], [[0.23, 0.1], [0.23, 0.2]]]])
+    walls = WallTracks(("low", "high"), halves, np.full(2, np.nan))
+    table = SimpleNamespace(file="walls.csv", arcs=None, corners=None)
+    experiment = SimpleNamespace(config=SimpleNamespace(walls=table, photographs=None), folder=Path("box"))
+    check_inside(experiment, tracks_at(np.array([[0.19, 0.05], [0.22, 0.15]])), walls)
+    with pytest.raises(InputError, match="wall 'low': grain 1 lies 20 mm beyond it"):
+        check_inside(experiment, tracks_at(np.array([[0.19, 0.05], [0.22, 0.05]])), walls)

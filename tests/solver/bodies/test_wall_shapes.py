@@ -11,8 +11,10 @@ from rodsight.solver.bodies.wall_shapes import (
     OUT,
     STRAIGHT,
     beside_wall,
+    bounding_distance,
     circle_ends,
     circle_parameters,
+    faces_walls,
     interpolate_walls,
     wall_displacement,
     wall_distance,
@@ -201,3 +203,32 @@ def test_rods_touch_a_bar_between_its_neighbours(overhang):
         ]
     )
     assert Walls.at_rest(box).face == pytest.approx(Walls.at_rest(box).length - [0, 0, 2 * overhang, 0], abs=3e-5)
+
+
+def split_side() -> np.ndarray:
+    """The right side of a box that is split at y = 0.1, its upper half shifted by 5 mm."""
+    return np.array([[[0.2, 0.0], [0.2, 0.1]], [[0.205, 0.1], [0.205, 0.2]]])
+
+
+def test_a_grain_touches_the_half_of_a_split_side_that_it_is_beside() -> None:
+    beside = np.array([[0.19, 0.095], [0.195, 0.105], [0.195, 0.205], [0.195, 0.25]])
+    faces = faces_walls(split_side(), None, beside, np.full(4, 0.01))
+    assert faces.tolist() == [[True, False], [False, True], [False, True], [False, False]]
+    alone = faces_walls(split_side()[:1], None, beside[1:2], np.array([0.01]))
+    assert alone.tolist() == [[True]]  # a wall measured too short
+    found = detect_contacts(rods(0.01, 0.01), beside[:2], np.ones(2, bool), Walls.at_rest(split_side()), 1e-4)
+    assert (found.j[found.with_wall] - 2).tolist() == [0, 1]
+
+
+def test_a_grain_past_the_end_of_one_wall_is_not_beyond_it() -> None:
+    corner = np.concatenate([split_side(), [[[0.205, 0.2], [0.0, 0.2]]]])
+    place = np.array([[0.203, 0.15], [0.203, 0.05], [0.25, 0.25], [0.19, 0.15]])
+    distance, normal = bounding_distance(corner, None, place)
+    assert np.isinf(distance[0, 0])  # in the upper half: the line of the lower one does not bound it
+    assert distance[0, 1] == pytest.approx(0.002)
+    assert distance[1, 0] == pytest.approx(-0.003)  # beside the lower half and beyond it
+    assert (distance[2] < 0.0).all()  # outside of the corner: beyond several walls
+    assert np.isfinite(distance[3]).all()
+    assert normal.shape == (4, 3, 2)
+    far = bounding_distance(corner[:1], None, np.array([[0.35, 0.15], [0.25, 0.15]]))[0]
+    assert far[:, 0] == pytest.approx([-0.15, np.inf])  # the first is farther away than the wall is long

@@ -194,3 +194,29 @@ def test_all_corrections_are_described() -> None:
     kept, none = correct_boundary(shifted, NOISE, BAR, BoundarySettings(camera=False, continued=False))
     assert np.array_equal(kept.position, shifted.position)
     assert none.describe(("floor", "right", "lid", "left")) == []
+
+
+def floor_with(*past: tuple[float, float], endpoints: np.ndarray | None = None) -> MeasuredSequence:
+    """Rods on a floor, and others at places (x, y) [radii] from its right end."""
+    sequence, bars = sheared_box()
+    place = np.array([SIDE, 0.0]) + RADIUS * np.array(past)
+    position = np.concatenate([sequence.position[:, :14], np.tile(place, (FRAMES, 1, 1))], axis=1)
+    shape = position.shape[:2]
+    floor = bars[:, :1]
+    if endpoints is not None:
+        floor = np.concatenate([floor, np.tile(endpoints, (FRAMES, 1, 1, 1))], axis=1)
+    return MeasuredSequence(
+        np.full(shape[1], RADIUS), position, np.zeros(shape), np.ones(shape, bool), floor, np.full(shape, NOISE)
+    )
+
+
+def test_a_wall_ends_where_a_rod_stands_across_its_line() -> None:
+    assert continue_walls(floor_with((2.0, 1.0)))[0, 1] > 0.0
+    assert not continue_walls(floor_with((2.0, 1.0), (3.5, 0.1))).any()  # heaved beside a footing
+    assert continue_walls(floor_with((2.0, 1.0), (12.0, 0.1)))[0, 1] > 0.0  # far from the end
+
+
+def test_a_wall_ends_where_another_that_faces_the_same_way_goes_on() -> None:
+    next_half = np.array([[SIDE, 0.0], [2.0 * SIDE, 0.0]])
+    assert not continue_walls(floor_with((2.0, 1.0), endpoints=next_half)).any()
+    assert continue_walls(floor_with((2.0, 1.0), endpoints=next_half[::-1]))[0, 1] > 0.0  # faces the other way
