@@ -22,7 +22,7 @@ MAX_TRUST_MEASURED = 0.96  # the gaps show the overlaps; r .98 to .996 on simula
 MAX_TRUST_STATED = 0.65  # softness is specified and no gap shows it; r .66 to .74 on photoelastic discs
 RELIABILITY_DISAGREEMENT: tuple[float, float] = tuple(FITTED["motion_reliability"]["disagreement"])
 RELIABILITY_CORRECTION: tuple[float, float] = tuple(FITTED["motion_reliability"]["correction"])
-WEIGHT_TERMS = ("constant", "correction", "unclear", "sliding")  # coefficients of the weight in fitted.toml
+WEIGHT_TERMS = ("constant", "correction", "unclear", "sliding", "members", "nearer")  # of the weight in fitted.toml
 LEAST_WEIGHT: float = FITTED["position_weight"]["least"]  # weights below it are not used
 # Of 1 − R of a sound frame, the fraction that its motion estimate errs by on average (sixteen scenarios, seed 0). A
 # reliability of LOW or less is taken as the expectation itself.
@@ -152,7 +152,8 @@ def evident_position_weight(evidence: Evidence) -> float:
     Returns
     -------
     float
-        w = 1/(1 + exp(−(a_0 + a_1 ln ε + a_2 ln(1 − c) + a_3 ln p))), in (0, 1), with a from fitted.toml.
+        w = 1/(1 + exp(−s)) in (0, 1), with a from fitted.toml and
+        s = a_0 + a_1 ln ε + a_2 ln(1 − c) + a_3 ln p + a_4 ln D + a_5 (arctanh c − arctanh d).
     """
     table = FITTED["position_weight"]
     score = float(position_weight_terms(evidence) @ np.array([table[name] for name in WEIGHT_TERMS]))
@@ -172,7 +173,16 @@ def position_weight_terms(evidence: Evidence) -> Array:
         logarithm(evidence.correction, table["default_correction"], table["correction_range"]),
         logarithm(1.0 - evidence.position_agreement, table["default_unclear"], table["unclear_range"]),
         logarithm(evidence.power_gap, table["default_sliding"], table["sliding_range"]),
+        logarithm(evidence.disagreement, table["default_members"], table["members_range"]),
+        _how_much_nearer(evidence, table["nearer_range"]),
     ])  # fmt: skip
+
+
+def _how_much_nearer(evidence: Evidence, limits: list[float]) -> float:
+    """How much nearer the position-only estimate is to the balance of overlaps than the motion is; 0: unknown."""
+    low, high = limits
+    near = np.arctanh(np.clip([evidence.position_agreement, evidence.overlap_agreement], low, high))
+    return float(np.nan_to_num(near[0] - near[1]))
 
 
 def fused_trust(first: float, second: float, agreement: float, weight: float) -> float:

@@ -21,7 +21,6 @@ from scipy.special import expit
 from ...experiment.experiment import load_experiment
 from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
-from ...solver.assessment.evidence import Evidence
 from ...solver.assessment.fitted import FITTED
 from ...solver.assessment.mixture_trust import LEAST_WEIGHT, WEIGHT_TERMS, position_weight_terms
 from ...solver.baselines.motion_free import overlap_balance
@@ -34,10 +33,10 @@ from ...synthetic.scenarios.preset_names import ScenarioName
 from ...synthetic.scenarios.scenario_folder import make_scenario
 from .scenario_score import ScenarioSolution, StudyPlan, solve_scenario, true_forces
 
-FIRST, STRIDE = 3, 3  # of the frames that are read
+FIRST, STRIDE = 1, 2  # of the frames that are read
 WEIGHTS = np.linspace(0.0, 1.0, 11)  # of the position-only estimate
 TOLERATED, PRICE = 0.003, 3.0  # loss against the better part; its price beyond, over that of a loss against the best
-RIDGE, STARTS, STEPS = 1e-4, 3, 1500
+RIDGE, STARTS, STEPS = 1e-3, 3, 3000  # of coefficients of terms in standard deviations
 FOLDS = 5
 EXCESS = 0.005  # loss against the better part that is counted
 
@@ -67,7 +66,7 @@ class MixtureSample:
 def sample_mixtures(
     plan: StudyPlan, scenarios: Sequence[ScenarioName], seeds: Sequence[int], progress: Progress = no_progress
 ) -> MixtureSample:
-    """Solve scenarios by their motion alone, and mix every third frame with its position-only estimate."""
+    """Solve scenarios by their motion alone, and mix every second frame with its position-only estimate."""
     motion = replace(plan, settings=(*plan.settings, "solver.positions=never"))
     found: list[tuple[str, Array, Array]] = []
     cases: list[tuple[ScenarioName, int]] = [(name, seed) for name in scenarios for seed in seeds]
@@ -91,16 +90,21 @@ def fit_weight(sample: MixtureSample) -> Array:
     """Coefficients (t,) of the terms; every kind counts the same."""
     _, index, count = np.unique(sample.kind, return_inverse=True, return_counts=True)
     weight, best, better = 1.0 / count[index], sample.r.max(axis=1), sample.better
+    middle, spread = sample.terms.mean(axis=0), sample.terms.std(axis=0)
+    middle[0], spread[0] = 0.0, 1.0  # the constant
+    terms = (sample.terms - middle) / spread
 
     def loss(coefficients: Array) -> float:
-        r = sample.reached(expit(sample.terms @ coefficients))
+        r = sample.reached(expit(terms @ coefficients))
         lost = best - r + PRICE * np.maximum(better - r - TOLERATED, 0.0)
-        return float(np.average(lost, weights=weight)) + RIDGE * float(coefficients @ coefficients)
+        return float(np.average(lost, weights=weight)) + RIDGE * float(coefficients[1:] @ coefficients[1:])
 
-    starts = np.random.default_rng(0).normal(0.0, 0.3, (STARTS, sample.terms.shape[1]))
-    options = {"maxiter": STEPS, "maxfev": STEPS, "fatol": 1e-7}
+    starts = np.random.default_rng(0).normal(0.0, 0.3, (STARTS, terms.shape[1]))
+    options = {"maxiter": STEPS, "maxfev": STEPS, "fatol": 1e-7, "adaptive": True}
     trials = [minimize(loss, start, method="Nelder-Mead", options=options) for start in starts]
-    return np.asarray(min(trials, key=lambda trial: trial.fun).x)
+    found = np.asarray(min(trials, key=lambda trial: trial.fun).x) / spread
+    found[0] -= found[1:] @ middle[1:]
+    return found
 
 
 def print_mixture(console: Console, sample: MixtureSample) -> None:
@@ -167,16 +171,16 @@ def _mix_frames(solution: ScenarioSolution, true: Sequence[tuple[Keys, Array]]) 
         contacts, force = overlap_balance(sequence.packing, sequence.snapshots, k, noise)
         motion = frame.contacts.key, frame.fn / frame.fn.sum()
         geometry = positions.contacts.key, positions.fn / positions.fn.sum()
-        evidence = _with_agreement(solution.evidence[k], geometry, (contacts.key, force[:, 0]))
+        balance = contacts.key, force[:, 0]
+        evidence = replace(
+            solution.evidence[k],
+            position_agreement=_correlate(geometry, balance), overlap_agreement=_correlate(motion, balance),
+        )  # fmt: skip
         key, one, two = align(*motion, *geometry)
         truth = true[k][0], true[k][1][:, 0]
         r = [_correlate((key, (1.0 - w) * one + w * two), truth) for w in WEIGHTS]
         found.append((position_weight_terms(evidence), np.array(r)))
     return found
-
-
-def _with_agreement(evidence: Evidence, positions: tuple[Keys, Array], balance: tuple[Keys, Array]) -> Evidence:
-    return replace(evidence, position_agreement=_correlate(positions, balance))
 
 
 def _correlate(one: tuple[Keys, Array], two: tuple[Keys, Array]) -> float:
