@@ -15,6 +15,7 @@ from ..calibration.gaps import MeasuredSequence
 CONTACT_DISTANCE = 0.05  # radii: greatest distance of a rod's surface from the line of a wall that it bears on
 PAST_END = 0.5  # radii: rods nearer to an end bear on the given wall
 NEIGHBOUR_DISTANCE = 1.0  # radii: a wall is extended along rods whose surface is this near to its line
+BEARING = 0.3  # of the rods near the line of a wall, those that touch it: more than half at a wall, few at a surface
 PARALLEL = 0.1  # sine of the least angle of two walls that meet
 ACROSS, NEAR_END = 0.5, 4.0  # radii: greatest distance of a centre from a line that the rod crosses, and from the end
 
@@ -23,8 +24,9 @@ def continue_walls(sequence: MeasuredSequence) -> Array:
     """Compute the extension (w, 2) [m] of each wall beyond its ends, zero where it is long enough.
 
     A wall is extended only where a rod bears on its line beyond the end: past the last rod beside the line in any
-    frame, but not beyond the line of another wall. It is long enough where a rod stands across its line past the end,
-    as beside a footing, and along rods that are beside another wall which faces the same way, as in a split box.
+    frame, but not beyond the line of another wall. It is long enough where a rod stands across its line past the end or
+    few of the rods near the line touch it, as beside a footing, and along rods that are beside another wall which faces
+    the same way, as in a split box.
     """
     ends, straight = sequence.endpoints, _straight(sequence)
     along = _along(outward_normals(ends))
@@ -74,7 +76,7 @@ def _past_ends(sequence: MeasuredSequence) -> Iterator[_PastEnd]:
                 near = free & (off < NEIGHBOUR_DISTANCE * radius) & (past > 0.0)
                 close = (past > radius) & (past < NEAR_END * radius)
                 across = free & close & (np.abs(depth) < ACROSS * radius)
-            if bears.any() and not across.any():
+            if bears.any() and bears.sum() > BEARING * near.sum() and not across.any():
                 yield _PastEnd(w, end, past, bears, near)
 
 

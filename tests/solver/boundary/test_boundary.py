@@ -216,6 +216,12 @@ def test_a_wall_ends_where_a_rod_stands_across_its_line() -> None:
     assert continue_walls(floor_with((2.0, 1.0), (12.0, 0.1)))[0, 1] > 0.0  # far from the end
 
 
+def test_a_wall_ends_where_few_of_the_rods_near_its_line_touch_it() -> None:
+    surface = ((4.0, 1.4), (6.0, 1.7), (8.0, 1.5))  # of a bed whose highest rods are level with a footing
+    assert not continue_walls(floor_with((2.0, 1.0), *surface)).any()
+    assert continue_walls(floor_with((2.0, 1.0), *surface[:2]))[0, 1] > 0.0
+
+
 def test_a_wall_ends_where_another_that_faces_the_same_way_goes_on() -> None:
     next_half = np.array([[SIDE, 0.0], [2.0 * SIDE, 0.0]])
     assert not continue_walls(floor_with((2.0, 1.0), endpoints=next_half)).any()
