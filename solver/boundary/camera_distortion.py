@@ -24,6 +24,7 @@ EXPLAINED = 0.95  # greatest ratio of the robust scatter of touching gaps after 
 # Unknowns of the model, by their rows.
 ANISOTROPY, RADIAL, PERSPECTIVE, DECENTRING, UNKNOWNS = slice(0, 2), slice(2, 6), slice(6, 8), slice(8, 10), 10
 TERMS = ("a", "b", "k_1", "k_2", "k_3", "k_4", "p", "q", "c", "d")  # names of the unknowns
+KINDS = ((ANISOTROPY, "a stretching"), (RADIAL, "a lens"), (PERSPECTIVE, "a perspective"), (DECENTRING, "its middle"))
 MODELS = ((2,), (0, 1), (2, 3), (0, 1, 2), (0, 1, 2, 3), (0, 1, 6, 7), (0, 1, 2, 3, 6, 7))
 EXTENSIONS = ((3,), (8, 9), (4,), (4, 5))  # of a lens that was found: higher orders, another middle
 GAIN = 2.0  # standard errors, by which the likelihood of pairs that were not fitted must rise for an extension
@@ -154,20 +155,19 @@ class CameraDistortion:
 
     def describe_terms(self) -> str:
         """Describe the camera and the sizes with their standard errors in one sentence, for a user."""
-        fitted = np.flatnonzero(self.value)
-        terms = [
-            f"{TERMS[k].replace('_', '')} = {100.0 * self.value[k]:.2g} ± {100.0 * self.sd[k]:.1g} %" for k in fitted
-        ]
+        values = zip(TERMS, 100.0 * self.value, 100.0 * self.sd, strict=True)
+        term = [f"{name.replace('_', '')} = {each:.2g} ± {sd:.1g} %" if each else "" for name, each, sd in values]
+        terms = [f"{kind} ({', '.join(filter(None, term[rows]))})" for rows, kind in KINDS if self.value[rows].any()]
         camera = f"{', '.join(terms)} of half the width" if terms else "no distortion"
         if terms and not self.applied:
             camera += " (not applied)"
         sizes = [
-            f"{1e3 * size:.4g} mm by {1e6 * error:+.2g} ± {1e6 * sd:.1g} µm"
+            f"{1e3 * size:.4g} mm {1e6 * error:+.2g} ± {1e6 * sd:.1g} µm"
             for size, error, sd in zip(self.size, self.radius_error, self.radius_error_sd, strict=True)
         ]
         return (
-            f"gaps of near grains show {camera} and scatter by {1e6 * self.explained:.2g} µm"
-            f"{f', {1e6 * self.scatter:.2g} µm before' if self.applied else ''}; touching surfaces meet with radii of "
+            f"gaps of near grains show {camera} and scatter by {1e6 * self.explained:.3g} µm"
+            f"{f', {1e6 * self.scatter:.3g} µm before' if self.applied else ''}; touching surfaces meet with radii "
             f"{', '.join(sizes)}"
         ).replace("-", "−")
 

@@ -146,7 +146,7 @@ def _diagnosis(scene: Scene) -> str:
     """Return what makes the forces wrong; empty where nothing contradicts the model."""
     if not scene.diagnosis:
         return ""
-    return "\n".join(["## Something is wrong", "", *(f"- {printable(each)}" for each in scene.diagnosis)])
+    return "\n".join(["## Found wrong", "", *(f"- {printable(each)}" for each in scene.diagnosis)])
 
 
 def _camera(scene: Scene) -> str:
@@ -163,8 +163,8 @@ def _trust_penalties(frames: list[FrameSummary]) -> str:
     rows = [f"- frame {frame}, T {trust:.2f}: {_cell(reasons)}" for trust, frame, reasons in lowest[:MAX_REASONS]]
     if not rows:
         return ""
-    heading = f"Reasons that lower T, least trusted frames first ({len(rows)} of {len(lowest)} frames):"
-    return "\n".join([heading, "", *rows])
+    some = f" ({len(rows)} of {len(lowest)} frames)" if len(rows) < len(lowest) else ""
+    return "\n".join([f"Reasons that lower T, least trusted frames first{some}:", "", *rows])
 
 
 def _accuracy(frames: list[FrameSummary]) -> str:

@@ -61,7 +61,8 @@ def test_the_summary_states_the_camera_with_intervals_where_it_was_sought(tmp_pa
     write_recording(replace(results, lens=lens), tmp_path / "run.rrd")
     text = rows(tmp_path / "run.rrd", "/summary")[-1]["TextDocument:text"][0]
     assert "## Camera and radii" in text
-    assert "a = −0.15 ± 0.02 %, k1 = 2 ± 0.02 % of half the width and scatter by 30 µm, 80 µm before" in text
-    assert "radii of 8 mm by −2 ± 0.5 µm" in text
+    assert "a stretching (a = −0.15 ± 0.02 %), a lens (k1 = 2 ± 0.02 %) of half the width and scatter by 30 µm" in text
+    assert "30 µm, 80 µm before" in text
+    assert "radii 8 mm −2 ± 0.5 µm" in text
     write_recording(results, tmp_path / "plain.rrd")
     assert "Camera" not in rows(tmp_path / "plain.rrd", "/summary")[-1]["TextDocument:text"][0]
