@@ -15,6 +15,7 @@ from ...solver.boundary.camera_distortion import CameraDistortion, find_camera_d
 from ...solver.boundary.size_classes import group_readings
 from ...solver.boundary.walls_in_picture import correct_walls_in_picture
 from ...solver.detection.precision import contradiction, describe_contradiction, measure_precision
+from ...solver.mixture.soft_grains import find_soft_overlap
 from ...solver.posterior.sequence_evidence import gather_position_evidence
 from ...tracks import Tracks, WallTracks
 from ..snapshots import make_snapshots, measure_sequence
@@ -84,7 +85,9 @@ def correct_camera(
     if walls.count:
         if not found.applied:  # calibration finds a lesser distortion with the walls
             return tracks, walls, "", None
-        # Touching surfaces meet by other distances, or by other radii where these were read in the same picture.
+        # Touching surfaces of hard grains meet by other distances, or by other radii if read in the same picture.
+        undistorted = replace(tracks, position=found.correct(tracks.position))
+        soft = soft or (material.stiffness is None and _overlap_softly(material, undistorted, walls, failed))
         scale = 1.0 if soft else found.common_scale()
         distance, radius = (scale, tracks.radius) if radii_known else (1.0, tracks.radius / scale)
         corrected = found.correct_scaled(position, distance)
@@ -112,6 +115,12 @@ def correct_camera(
     return (
         replace(tracks, position=found.correct(tracks.position), radius=radius), walls, "; ".join(sentences), found,
     )  # fmt: skip
+
+
+def _overlap_softly(material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]) -> bool:
+    """Whether the overlaps vary as those of soft grains, so that they are forces and no error of the scale."""
+    packing = material.pack(tracks.radius, walls.usual_pressure(material.length), boundary=tracks.boundary)
+    return find_soft_overlap(packing, interpolate_ignored_frames(make_snapshots(tracks, walls), failed)) > 0.0
 
 
 def _noise_of_gaps(material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]) -> float:

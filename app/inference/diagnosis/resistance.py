@@ -18,6 +18,7 @@ from .data_quality import measure_data_quality
 # the noise of contacts at rest worse than forces of either sign. Sheared packings slide at .2 and more of them; under
 # a rising pressure, or nearly jammed, at less than .06, and there the attraction was named wrongly.
 LEAST_SLIDING = 0.1
+LEAST_NAMED = 0.005  # of the mean force: a lesser drag or attraction explains nothing, whatever else was fitted with it
 
 
 def examine_resistance(sequence: CorrectedSequence) -> list[Finding]:
@@ -30,6 +31,9 @@ def examine_resistance(sequence: CorrectedSequence) -> list[Finding]:
     if found is None or not found.cause or (found.cause == "friction" and sequence.friction_measured):
         return []
     if found.cause == "adhesion" and not _slides(sequence):
+        return []
+    named = {"base_friction": found.found.base_drag, "adhesion": found.found.attraction}
+    if named.get(found.cause, 1.0) < LEAST_NAMED:
         return []
     words: dict[str, Callable[[], str]] = {
         "photographs_reversed": lambda: "friction acts along the sliding as given, and against it in reverse order",

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rodsight.inference.correction import boundary
 from rodsight.inference.correction.boundary import correct_camera
 from rodsight.inference.diagnosis.distortion import undistorted
 from rodsight.inference.inference_settings import InferenceSettings
@@ -61,6 +62,17 @@ def test_a_stretched_picture_is_restored_with_its_walls(given) -> None:
     assert np.abs(distances(corrected, moved) - distances(*given)).max() < NEAR
     assert "a stretching of 0.5" in sentence
     assert "distances were multiplied by 0.995" in sentence
+
+
+def test_overlaps_of_soft_grains_are_no_error_of_the_scale(given, monkeypatch) -> None:
+    tracks, walls = given
+    seen = replace(tracks, position=stretched(tracks.position)), replace(walls, endpoints=stretched(walls.endpoints))
+    monkeypatch.setattr(boundary, "find_soft_overlap", lambda *_: 1e-5)
+    corrected, moved, sentence, found = correct_camera(MATERIAL, *seen, (), radii_known=True)
+    assert found is not None
+    ratio = distances(corrected, moved) / np.maximum(distances(*given), 1e-3)
+    assert np.median(ratio[ratio > 0.5]) == pytest.approx(1.005, abs=1e-3)
+    assert "multiplied" not in sentence
 
 
 def test_radii_that_were_read_in_the_picture_are_adapted_instead_of_distances(given) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -84,3 +85,9 @@ def test_the_coefficient_of_a_base_needs_the_scale_of_the_forces(sequence, monke
     assert not bare.scale_is_known
     (evidence,) = examine(unknown, monkeypatch, "base_friction")
     assert "coefficient" not in evidence
+
+
+@pytest.mark.parametrize(("cause", "value"), [("base_friction", "base_drag"), ("adhesion", "attraction")])
+def test_a_resistance_of_nothing_is_not_named(sequence, monkeypatch, cause, value) -> None:
+    monkeypatch.setattr(sys.modules[__name__], "FOUND", replace(FOUND, **{value: 0.002}))
+    assert examine(sequence, monkeypatch, cause) == []
