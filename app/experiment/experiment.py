@@ -30,6 +30,7 @@ CONFIG_NAME = "experiment.toml"
 POSITION_COLUMNS = ("frame", "id", "x", "y")  # of a pose without its rotation
 GRAIN_COLUMNS, POSE_COLUMNS = ("id", "radius"), ("frame", "id", "x", "y", "theta")
 TIME_COLUMNS, CELL_COLUMNS = ("frame", "time"), ("frame", "ax", "ay", "bx", "by")
+MAX_TIME = 9e9  # [s]: whole nanoseconds on the time line of a recording end at 9.2e9
 FLAT = 1e-9  # sine of the angle between the vectors of a cell, at most, that has no area
 
 
@@ -167,7 +168,7 @@ def load_experiment(path: Path, settings: Sequence[str] = (), *, root: Path | No
         raise InputError(file, "", "there is no such file; an experiment is a folder with experiment.toml")
     inputs = InputFiles(root)
     config = load_config(file, tuple(settings), inputs)
-    return Experiment(file, config, inputs, settings_of_file(inputs.read(file)))
+    return Experiment(file, config, inputs, settings_of_file(inputs.read(file, text=True)))
 
 
 def settings_of_file(content: bytes) -> dict[str, Any] | None:
@@ -225,7 +226,11 @@ def read_times(experiment: Experiment, frame_count: int) -> Array:
     if config.photographs is not None and config.photographs.interval is not None:
         order = experiment.given_order()
         number = np.arange(frame_count) if order is None else order.number[:frame_count] - order.number[0]
-        return number.astype(np.float64) * config.photographs.interval
+        times = number.astype(np.float64) * config.photographs.interval
+        if frame_count and times[-1] > MAX_TIME:
+            beyond = f"puts the last photograph at {times[-1]:.3g} s, and times end at {MAX_TIME:.0e} s (285 years)"
+            raise InputError(experiment.file, f"key photographs.interval = {config.photographs.interval:g}", beyond)
+        return times
     name = config.photographs.times if config.photographs is not None else config.tracks and config.tracks.times
     assert name is not None
     return arrange_times(experiment.table(name, TIME_COLUMNS), frame_count)
@@ -238,6 +243,9 @@ def arrange_times(table: Table, frame_count: int) -> Array:
     found = check_frames(table, frame)
     if found != frame_count:
         raise InputError(table.file, "frame", f"has times of {found} frames, but there are {frame_count} frames")
+    beyond = np.flatnonzero(np.abs(time) > MAX_TIME)
+    if len(beyond):
+        raise table.error(int(beyond[0]), "time", f"is beyond {MAX_TIME:.0e} s (285 years): times are in seconds")
     order = np.argsort(frame)
     late = np.flatnonzero(np.diff(time[order]) <= 0)
     if len(late):

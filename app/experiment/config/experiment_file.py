@@ -66,7 +66,7 @@ class ExperimentFile(InferenceSections, InputSections):
 def load_config(file: Path, settings: Sequence[str] = (), inputs: InputFiles | None = None) -> ExperimentFile:
     """Read an experiment file and override it by KEY=VALUE settings. Raises InputError with file, key and value."""
     try:
-        data = tomllib.loads((InputFiles() if inputs is None else inputs).read(file).decode("utf-8"))
+        data = tomllib.loads((InputFiles() if inputs is None else inputs).read(file, text=True).decode("utf-8"))
     except FileNotFoundError:
         raise InputError(file, "", "there is no such file") from None
     except (OSError, UnicodeDecodeError) as error:

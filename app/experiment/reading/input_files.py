@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import stat
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -16,6 +17,19 @@ def regular(file: Path) -> Path:
     if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):  # opening a folder raises its own error
         raise InputError(file, "", "is a device or a pipe, not a file")
     return file
+
+
+def read_text_file(file: Path) -> bytes:
+    """Return the bytes of a text file. Raises InputError where it has holes, OSError.
+
+    A hole is read as NULs, which no text holds, and takes no disk: the file can be larger than any memory.
+    """
+    if hasattr(os, "SEEK_HOLE"):
+        with regular(file).open("rb") as stream:
+            hole, size = os.lseek(stream.fileno(), 0, os.SEEK_HOLE), os.fstat(stream.fileno()).st_size
+        if hole < size:
+            raise InputError(file, "", f"is no text: it has a hole at byte {hole} of {size}")
+    return regular(file).read_bytes()
 
 
 class InputFiles:
@@ -46,13 +60,13 @@ class InputFiles:
         if not inside:
             raise InputError(file, "", f"lies outside of {self._root}: open the folder that holds both")
 
-    def read(self, file: Path) -> bytes:
-        """Return the bytes of a file.
+    def read(self, file: Path, *, text: bool = False) -> bytes:
+        """Return the bytes of a file; text: it is one, and has no holes.
 
         Raises OSError, InputError outside of the root, and RunError where it has changed since it was first read.
         """
         self.refuse_outside(file)
-        content = regular(file).read_bytes()
+        content = read_text_file(file) if text else regular(file).read_bytes()
         digest = hashlib.sha256(content).hexdigest()
         if self._sums.setdefault(file, digest) != digest:
             raise RunError(

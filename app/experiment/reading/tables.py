@@ -141,7 +141,7 @@ def read_table(
     """
     inputs = InputFiles() if inputs is None else inputs
     try:
-        content = inputs.read(file)
+        content = inputs.read(file, text=True)
         if b"\0" in content:
             raise InputError(file, f"row {content[: content.index(0)].count(10) + 1}", "holds a NUL character")
         header = _header(content)

@@ -15,6 +15,7 @@ from typing import Any
 from ...experiment.config.dotted_keys import leaves, with_values
 from ...experiment.config.experiment_file import find_wrong_values
 from ...experiment.experiment import CONFIG_NAME
+from ...experiment.reading.input_files import read_text_file
 from ...process.atomic import write_atomically
 from ...process.errors import InputError
 from .journal import Action, Contents, Journal, checksum_of
@@ -165,7 +166,7 @@ class Draft:
 
     def _read(self, name: str) -> bytes | None:
         try:
-            return self._inside(name).read_bytes()
+            return read_text_file(self._inside(name))
         except FileNotFoundError:
             return None
         except OSError as error:

@@ -16,6 +16,7 @@ import numpy as np
 
 from ...experiment.experiment import CONFIG_NAME
 from ...experiment.pictures.picture_file import RAW_SUFFIXES
+from ...experiment.reading.input_files import read_text_file
 from ...experiment.reading.photograph_order import in_order, natural_key
 from ...process.atomic import replacing_folder, write_atomically
 from ...process.errors import InputError
@@ -91,8 +92,8 @@ def _named_folders(folder: Path) -> tuple[Path, ...]:
     if not _is_file(file):
         return ()
     try:
-        section = tomllib.loads(file.read_text(encoding="utf-8")).get("photographs")
-    except (OSError, ValueError, RecursionError):
+        section = tomllib.loads(read_text_file(file).decode("utf-8")).get("photographs")
+    except (OSError, ValueError, RecursionError, InputError):
         return tuple(_listed(folder))
     pattern = section.get("files") if isinstance(section, dict) else None
     return ((folder / pattern).parent,) if isinstance(pattern, str) else ()

@@ -1,5 +1,6 @@
 """Every mistake in the input gives one line with file, place and value, exit status 2, and writes nothing."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,7 @@ MISTAKES = {
     "small radii": (GRAINS, lambda f: scale_radii(f, 0.5), ["grains.csv", "radius", "stand apart", "2.00"]),
     "millimetres": (GRAINS, lambda f: scale_radii(f, 1e3), ["grains.csv", "radius", "in metres"]),
     "nan": (TRACKS, lambda f: swap_row(f, 8, {2: "nan"}), ["row 8", "x = 'nan'"]),
+    "hole": (TRACKS, lambda f: os.truncate(f, f.stat().st_size + (1 << 20)), ["no text", "hole"]),
     "not a number": (TRACKS, lambda f: swap_row(f, 9, {3: "left"}), ["row 9", "y = 'left'"]),
     "twice": (TRACKS, lambda f: swap_row(f, 4, {1: "1"}), ["row 4", "id = '1'", "twice"]),
     "unknown id": (TRACKS, lambda f: swap_row(f, 5, {1: "777"}), ["row 5", "777"]),
@@ -40,6 +42,7 @@ MISTAKES = {
     "walls of fewer frames": (WALLS, lambda f: cut(f, 4 * 4 + 1), ["4 frames", "5 frames"]),
     "radius": (GRAINS, lambda f: swap_row(f, 3, {1: "0"}), ["row 3", "radius = '0'"]),
     "id twice": (GRAINS, lambda f: swap_row(f, 3, {0: "0"}), ["row 3", "twice"]),
+    "time in nanoseconds": (TIMES, lambda f: swap_row(f, 6, {1: "1.5e18"}), ["row 6", "1.5e18", "9e+09 s"]),
     "time goes back": (TIMES, lambda f: swap_row(f, 4, {1: "0.5"}), ["row 4", "0.5"]),
     "truth unknown grain": ("truth_contacts.csv", lambda f: swap_row(f, 2, {1: "999"}), ["row 2", "999"]),
     "truth unknown wall": ("truth_contacts.csv", lambda f: swap_row(f, 2, {2: "roof"}), ["row 2", "roof"]),

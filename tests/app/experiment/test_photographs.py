@@ -10,7 +10,7 @@ from types import ModuleType, SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from rodsight.experiment.experiment import load_experiment
+from rodsight.experiment.experiment import load_experiment, read_times
 from rodsight.experiment.photographs import Photographs, PrefetchedPhotographs
 from rodsight.experiment.pictures.image import ImageSelection
 from rodsight.experiment.pictures.picture_file import read_photograph
@@ -340,3 +340,12 @@ def test_a_mask_can_be_a_picture(tmp_path):
     write(tmp_path, "mask.png", mask[:-1])
     with pytest.raises(InputError, match="mask: is 60 x 39 pixels, the photographs are 60 x 40"):
         load_experiment(tmp_path).photographs()
+
+
+def test_an_interval_with_times_that_no_time_line_holds_is_refused(tmp_path):
+    write(tmp_path, "a.png", np.full((40, 60), 50, np.uint8))
+    file = tmp_path / "experiment.toml"
+    file.write_text('name = "x"\n[photographs]\nfiles = "a.png"\npixel_size = 1e-4\ninterval = 9e8\n')
+    assert read_times(load_experiment(tmp_path), 10)[-1] == 8.1e9
+    with pytest.raises(InputError, match=r"interval = 9e\+08: puts the last photograph at 1\.71e\+10 s"):
+        read_times(load_experiment(tmp_path), 20)

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 import rodsight
 from rodsight.manual.contents import FOLDER
-from rodsight.results.hdf5.reader import StoredFrames
+from rodsight.results.hdf5.reader import StoredRun
 from rodsight.solver.contacts.contacts import ContactSource
 
 from tests.program import rodsight as command
@@ -112,8 +112,8 @@ def test_a_forbidden_contact_bears_nothing_and_the_input_is_used_again(run):
 
 def test_a_local_change_of_one_frame_reads_no_other(run, monkeypatch):
     read = []
-    own = StoredFrames._read
-    monkeypatch.setattr(StoredFrames, "_read", lambda frames, k: read.append(k) or own(frames, k))
+    own = StoredRun.frame
+    monkeypatch.setattr(StoredRun, "frame", lambda stored, k, *more: read.append(k) or own(stored, k, *more))
     run = rodsight.open(run.file.parent)
     strongest = run.contacts(4).query("j >= 0").nlargest(1, "fn")[["i", "j"]].to_numpy()[0].tolist()
     read.clear()

@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import tomllib
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -118,7 +119,7 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("kind", [*BAD, "not UTF-8", "folder"])
+@pytest.mark.parametrize("kind", [*BAD, "not UTF-8", "folder", "larger than memory"])
 def test_a_bad_folder_is_shown_as_such_beside_the_others(root, kind):
     folder = os.fsencode(root) + (b"/b\xff\xfed" if kind == "not UTF-8" else b"/bad")
     os.mkdir(folder)
@@ -128,7 +129,14 @@ def test_a_bad_folder_is_shown_as_such_beside_the_others(root, kind):
     else:
         with open(folder + b"/experiment.toml", "wb") as file:
             file.write(BAD.get(kind, b'name = "bad"\n'))
-    experiments = Visitor(Workbench(root)).enter().request("home")["experiments"]
+            if kind == "larger than memory":  # and takes no disk: an archive holds it in a kilobyte
+                file.truncate(100 << 20)
+    tracemalloc.start()
+    try:
+        experiments = Visitor(Workbench(root)).enter().request("home")["experiments"]
+        assert tracemalloc.get_traced_memory()[1] < 50 << 20
+    finally:
+        tracemalloc.stop()
     good = next(each for each in experiments if each["name"] == "tracked")
     assert "error" not in good
     if kind != "folder":

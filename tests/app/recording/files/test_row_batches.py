@@ -71,12 +71,14 @@ def test_the_most_rows_are_sent_once_all_are_many_and_points_wait(monkeypatch):
     monkeypatch.setattr(row_batches, "WAITING", 10**9)
     add("/rows", 0)
     one_row = batches._sizes["/rows"]
-    monkeypatch.setattr(row_batches, "WAITING", 4 * one_row)
+    monkeypatch.setattr(row_batches, "WAITING", 5 * one_row)
     add("/few", 0)
     add("/rows", 1)
     assert stream.rows == []
     add("/few", 1)
-    assert stream.rows == [("/rows", 2)]
+    assert stream.rows == []
+    add("/rows", 2)
+    assert stream.rows == [("/rows", 3)]
     add("/rows", 3)
     assert stream.rows[1:] == []
     batches.begin((("frame", 3),))
