@@ -20,7 +20,7 @@ from .calibration import calibrate_tracks, known_radii
 from .close_photographs import choose_span, count_alike
 from .friction import measure_friction, measure_resisting, refine_wall_friction, tuned_radii, use_unstated
 from .outliers import remove_outliers
-from .radii import calibrate_with_radii, use_size_classes
+from .radii import calibrate_with_radii, correct_exchanged_sizes, use_size_classes
 from .short_gaps import interpolate_short_gaps
 from .soft_grain_errors import correct_soft_grains
 from .softness import assume_softness, find_softness
@@ -54,14 +54,15 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     """
     walls, settings = inputs.walls, inputs.settings
     walls, failed = complete_walls(inputs.tracks, walls)
-    tracks, outlier_remark = remove_outliers(inputs.tracks, walls)
+    given, size_remark = (inputs.tracks, "") if settings.calibration is None else correct_exchanged_sizes(inputs.tracks)
+    tracks, outlier_remark = remove_outliers(given, walls)
     tracks, gap_remark = interpolate_short_gaps(tracks, walls)
     nothing_seen = len(failed) == tracks.frame_count
     if nothing_seen:
         settings = replace(settings, boundary=None, calibration=None, coordination=None)
     overlap, as_given = settings.overlap_of(tracks.radius), settings.calibration is None
     calibration = tuning = boundary = lens = None
-    remarks, material = [outlier_remark, gap_remark, "", "", "", "", "", ""], inputs.material
+    remarks, material = [outlier_remark, gap_remark, "", "", "", "", "", "", size_remark], inputs.material
     if settings.calibration is not None:
         if settings.sequence.uses_positions:
             material, remarks[6] = assume_softness(material, tracks, walls, failed)
@@ -89,7 +90,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         alike = span if settings.sequence.soft else max(span, count_alike(tracks, walls.load))
         settings = replace(settings, sequence=replace(settings.sequence, span=span, alike=alike))
     if settings.infer_unseen:
-        tracks = add_unseen(tracks, walls, known_radii(inputs.tracks.radius), settings.sequence.measured_overlap)
+        tracks = add_unseen(tracks, walls, known_radii(given.radius), settings.sequence.measured_overlap)
         calibration = None if calibration is None else calibration.of_grains(tracks.grain_count)
     inferred = 0 if tracks.inferred is None else int(tracks.inferred.sum())
     packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)

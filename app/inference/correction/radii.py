@@ -15,6 +15,7 @@ from ...solver.bodies.interpolation import interpolate_ignored_frames
 from ...solver.bodies.motion import Snapshot
 from ...solver.bodies.packing import Packing
 from ...solver.bodies.rods import RodMaterial
+from ...solver.boundary.exchanged_sizes import find_exchanged_sizes
 from ...solver.boundary.size_classes import find_size_classes
 from ...solver.calibration.calibrate import Calibration
 from ...solver.calibration.priors import CalibrationSettings
@@ -25,12 +26,36 @@ from ..snapshots import make_snapshots, measure_sequence
 from .calibration import calibrate_tracks, radius_classes
 from .outliers import walls_in
 
+NAMED = 8  # rods that a sentence lists
 SEED = 0  # of the draws: the same input gives the same bits
 # Mean overlap of the pairs of one size over that of another, below which a radius is wrong: .45 at least in simulated
 # soft packings of three sizes, .02 where one of three radii is 2 % too large.
 UNEQUAL = 0.25
 SEEN = 0.002  # mean overlap over a diameter, below which it does not matter
 FEWEST = 30  # overlaps of a size in all photographs, with which it counts
+
+
+def correct_exchanged_sizes(tracks: Tracks) -> tuple[Tracks, str]:
+    """Give rods that are stated to be of another size the size with which they touch their neighbours.
+
+    Returns
+    -------
+    Tracks
+    str
+        A sentence on the correction; empty: none.
+    """
+    classes = radius_classes(tracks.radius) if tracks.grain_count else None
+    if classes is None:
+        return tracks, ""
+    position = np.where(tracks.present[..., None], tracks.position, np.nan)
+    radius = find_exchanged_sizes(position, tracks.radius, classes)
+    changed = np.flatnonzero(radius != tracks.radius)
+    if not len(changed):
+        return tracks, ""
+    names = ", ".join(str(tracks.id[row]) for row in changed[:NAMED]) + ("…" if len(changed) > NAMED else "")
+    rods = "1 rod touches" if len(changed) == 1 else f"{len(changed)} rods touch"
+    sentence = f"{rods} the others only with another of the stated sizes, which is used: {names}"
+    return replace(tracks, radius=radius), sentence
 
 
 def use_size_classes(material: RodMaterial, tracks: Tracks) -> tuple[Tracks, str]:

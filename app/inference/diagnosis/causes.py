@@ -82,6 +82,10 @@ CAUSES: dict[str, Cause] = {
     ),
     "all_radii": Cause("contacts are lost or invented", "measure the radii anew, or the pixel size"),
     "class_radii": Cause("contacts of one size of rods are lost or invented", "measure the radii of every size anew"),
+    "exchanged_sizes": Cause(
+        "these rods penetrate their neighbours or touch none",
+        "a run uses the sizes with which they touch: correct their radii in the table",
+    ),
     "not_explained": Cause(
         "the forces contradict the motion, the positions or one another",
         "check radii, walls, pixel size and tracks; the packing may do what this model lacks, such as cohesion, "

@@ -1,4 +1,4 @@
-"""Distortion of the picture, which a run removes, as a cause; other tests see the input without it."""
+"""Errors that a run removes, exchanged sizes and a distorted picture, as causes; other tests see the input without."""
 
 from __future__ import annotations
 
@@ -8,19 +8,23 @@ from ...results.finding import Finding
 from ...solver.boundary.camera_distortion import ANISOTROPY, CameraDistortion
 from ...tracks import Tracks, WallTracks
 from ..correction.boundary import correct_camera
+from ..correction.radii import correct_exchanged_sizes
 from ..inputs import Inputs
 from .causes import finding
 
 
 def undistorted(inputs: Inputs, walls: WallTracks, failed: Collection[int]) -> tuple[Tracks, WallTracks, list[Finding]]:
-    """Return tracks and walls as a run corrects them for the camera, and what it corrects."""
-    settings = inputs.settings
+    """Return tracks and walls as a run corrects them for exchanged sizes and the camera, and what it corrects."""
+    settings, tracks, exchanged = inputs.settings, inputs.tracks, ""
+    if settings.calibration is not None:
+        tracks, exchanged = correct_exchanged_sizes(tracks)
+    named = [finding("exchanged_sizes", exchanged)] if exchanged else []
     if settings.boundary is None or not settings.boundary.camera or not walls.count:
-        return inputs.tracks, walls, []
+        return tracks, walls, named
     tracks, walls, _, found = correct_camera(
-        inputs.material, inputs.tracks, walls, failed, radii_known=settings.radii_are_known
+        inputs.material, tracks, walls, failed, radii_known=settings.radii_are_known
     )
-    return tracks, walls, [] if found is None else [_name(found)]
+    return tracks, walls, named if found is None else [*named, _name(found)]
 
 
 def _name(found: CameraDistortion) -> Finding:

@@ -36,7 +36,7 @@ TRUE_CAUSE: dict[ScenarioName, tuple[str, ...]] = {
     "wall_inside": ("wall_misplaced",), "aspect_03": ("stretched_picture",), "aspect_1": ("stretched_picture",),
     "lens_03": ("lens",),
     "soft_stretched": ("stretched_picture",), "softer_stretched": ("stretched_picture",),
-    "class_2": ("class_radii",), "wrong_class": ("not_explained", "class_radii"),
+    "class_2": ("class_radii",), "wrong_class": ("exchanged_sizes",),
     "some_radii": ("not_explained", "all_radii", "class_radii"),
     "outliers": ("outlier_tracks",), "one_jump": ("outlier_tracks",), "missing_poses": ("missing_poses",),
     "base_friction": ("base_friction",), "smooth_walls": ("wall_friction",), "rough_walls": ("wall_friction",),

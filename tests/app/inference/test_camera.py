@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from rodsight.inference.correction import boundary
 from rodsight.inference.correction.boundary import correct_camera
+from rodsight.inference.correction.correct_sequence import correct_sequence
 from rodsight.inference.diagnosis.distortion import undistorted
 from rodsight.inference.inference_settings import InferenceSettings
 from rodsight.inference.inputs import Inputs
@@ -145,3 +146,20 @@ def test_the_cause_is_named_and_other_tests_see_the_restored_picture(given) -> N
     assert named.cause == "stretched_picture"
     assert np.abs(distances(restored, moved) - distances(*given)).max() < NEAR
     assert undistorted(Inputs(tracks, walls, MATERIAL, InferenceSettings()), walls, ())[2] == []
+
+
+def test_exchanged_sizes_are_named_and_corrected_before_the_camera(given) -> None:
+    tracks, walls = given
+    wrong = tracks.radius.copy()
+    wrong[[31, 44]] = np.unique(wrong)[-1]
+    seen = replace(tracks, radius=wrong)
+    restored, _, (named,) = undistorted(Inputs(seen, walls, MATERIAL, InferenceSettings()), walls, ())
+    assert named.cause == "exchanged_sizes"
+    assert named.evidence.startswith("2 rods touch the others only with another of the stated sizes")
+    assert named.evidence.endswith("31, 44")
+    assert np.array_equal(restored.radius, tracks.radius)
+    corrected = correct_sequence(Inputs(seen, walls, MATERIAL, InferenceSettings()))
+    assert corrected.noise_remark.endswith(named.evidence)
+    assert np.abs(corrected.tracks.radius - tracks.radius).max() < NEAR
+    as_given = replace(InferenceSettings(), calibration=None)
+    assert undistorted(Inputs(seen, walls, MATERIAL, as_given), walls, ())[0].radius is wrong

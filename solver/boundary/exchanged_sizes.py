@@ -1,0 +1,113 @@
+"""Grains that are stated to be of another size than they are, as by a wrong row of a table.
+
+A grain that is stated too large lies inside its neighbours in all photographs; one that is stated too small touches
+none. The size of each grain is the one with which most of its neighbours touch it and none lies inside it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from ..bodies.grains import Array
+
+MOST_FRAMES = 6  # that are read, evenly over the sequence
+TOUCHING = 0.25  # of the least difference of two sizes: greatest gap or overlap of a touching pair
+INSIDE = 3.0  # touching neighbours that outweigh one inside which the grain lies
+# Touching neighbours per photograph by which a lesser and a greater size must be better: a loose grain touches none,
+# and by chance the hole that it is in may have the size of a greater one.
+LESSER, GREATER = 1.5, 2.5
+USUAL, HARD = 0.98, 0.5  # quantile of the overlaps of other grains, and its limit over that of a touching pair
+ROUNDS = 20
+MOST = 0.3  # fraction of the grains: if more seem exchanged, something else is wrong
+
+
+@dataclass(frozen=True, slots=True)
+class _Pairs:
+    """Candidate pairs (m,) of all photographs that are read, each in both orders."""
+
+    grain: NDArray[np.int64]
+    other: NDArray[np.int64]
+    distance: Array  # [m] of the centres
+
+
+def find_exchanged_sizes(position: Array, radius: Array, classes: NDArray[np.int64]) -> Array:
+    """Find the radii of grains that are stated to be of another of the stated sizes.
+
+    Parameters
+    ----------
+    position : (f, n, 2)
+        Centres [m], NaN where a grain is missing.
+    radius : (n,)
+        Stated radii [m].
+    classes : (n,)
+        Size of each grain, from 0.
+
+    Returns
+    -------
+    (n,)
+        Radii [m]; the stated ones where no other size is clearly better. All stay as stated where more than MOST would
+        change, or where the other grains overlap so much that an overlap shows no size.
+
+    Notes
+    -----
+    The score of a size is the number of neighbours with |gap| < t minus 3 Σ min(overlap/t − 1, 1) over those with
+    overlap > t, t a quarter of the least difference of two sizes, per photograph. In each round every grain changes to
+    its best size if that gains 1.5 (a lesser size) or 2.5 (a greater one), and no less than any of its neighbours.
+    """
+    sizes = np.array([np.median(radius[classes == c]) for c in range(int(classes.max()) + 1)])
+    if len(sizes) < 2:
+        return radius
+    touch = TOUCHING * float(np.diff(np.sort(sizes)).min())
+    pairs, frames = _candidate_pairs(position, 2.0 * float(sizes.max()) + touch)
+    found = radius.copy()
+    for _ in range(ROUNDS):
+        own = _score(pairs, found, found, touch) / frames
+        trial = np.stack([_score(pairs, np.full_like(found, size), found, touch) / frames for size in sizes])
+        best = trial.argmax(axis=0)
+        gain = trial[best, np.arange(len(found))] - own
+        change = gain > np.where(sizes[best] < found, LESSER, GREATER)
+        rival = np.zeros(len(found))
+        np.maximum.at(rival, pairs.grain, np.where(change, gain, 0.0)[pairs.other])
+        change &= gain >= rival
+        if not change.any():
+            break
+        found[change] = sizes[best[change]]
+    exchanged = np.abs(found - radius) > touch
+    if not exchanged.any():
+        return radius
+    kept = ~(exchanged[pairs.grain] | exchanged[pairs.other])
+    overlap = (radius[pairs.grain] + radius[pairs.other] - pairs.distance)[kept]
+    usual = float(np.quantile(np.append(overlap[overlap > 0.0], 0.0), USUAL))
+    certain = exchanged.mean() <= MOST and usual < HARD * touch
+    return np.where(exchanged, found, radius) if certain else radius
+
+
+def _candidate_pairs(position: Array, reach: float) -> tuple[_Pairs, int]:
+    """List the pairs nearer than `reach` [m], and the number of photographs that were read."""
+    read = np.unique(np.linspace(0, len(position) - 1, min(len(position), MOST_FRAMES)).round().astype(np.int64))
+    first, second, apart = [], [], []
+    for place in position[read]:
+        here = np.flatnonzero(np.isfinite(place[:, 0]))
+        if not len(here):
+            continue
+        near = here[KDTree(place[here]).query_pairs(reach, output_type="ndarray")]
+        first.append(near[:, 0])
+        second.append(near[:, 1])
+        apart.append(np.linalg.norm(place[near[:, 0]] - place[near[:, 1]], axis=1))
+    if not apart:
+        nothing = np.empty(0, np.int64)
+        return _Pairs(nothing, nothing, np.empty(0)), len(read)
+    i, j, distance = np.concatenate(first), np.concatenate(second), np.concatenate(apart)
+    return _Pairs(np.concatenate([i, j]), np.concatenate([j, i]), np.concatenate([distance, distance])), len(read)
+
+
+def _score(pairs: _Pairs, own: Array, others: Array, touch: float) -> Array:
+    """Score (n,) of radii `own` (n,) among neighbours of radii `others` (n,) [m], over all photographs."""
+    gap = pairs.distance - own[pairs.grain] - others[pairs.other]
+    inside = np.clip(-gap / touch - 1.0, 0.0, 1.0)
+    value = (np.abs(gap) < touch).astype(np.float64) - INSIDE * inside
+    return np.bincount(pairs.grain, weights=value, minlength=len(own)).astype(np.float64)

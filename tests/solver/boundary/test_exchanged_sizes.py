@@ -1,0 +1,67 @@
+"""Grains stated to be of another size are found by the neighbours that they penetrate or do not touch."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from rodsight.solver.boundary.exchanged_sizes import find_exchanged_sizes
+
+from tests.golden.forces import STORED
+
+pytestmark = pytest.mark.unit
+
+
+@pytest.fixture(scope="module")
+def packing() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions (f, n, 2) of a simulated shear of 60 rods, their radii and sizes."""
+    with np.load(STORED) as stored:
+        position, radius = stored["poses/position"], stored["poses/radius"]
+    return position, radius, np.unique(radius, return_inverse=True)[1]
+
+
+def exchanged(radius: np.ndarray, rows: list[int], step: int) -> tuple[np.ndarray, np.ndarray]:
+    """Radii of which some are stated as the next size (step 1) or the one before (−1)."""
+    sizes = np.unique(radius)
+    stated = radius.copy()
+    stated[rows] = sizes[np.clip(np.searchsorted(sizes, radius[rows]) + step, 0, len(sizes) - 1)]
+    return stated, np.unique(stated, return_inverse=True)[1]
+
+
+def test_right_sizes_stay_bit_by_bit(packing) -> None:
+    position, radius, classes = packing
+    assert np.array_equal(find_exchanged_sizes(position, radius, classes), radius)
+    one = np.zeros(len(radius), np.int64)
+    assert find_exchanged_sizes(position, np.full_like(radius, radius[0]), one).tolist() == [radius[0]] * len(radius)
+
+
+@pytest.mark.parametrize("step", [1, -1])
+def test_exchanged_sizes_are_found(packing, step) -> None:
+    position, radius, _ = packing
+    rows = [22, 31, 40, 44]  # none at a wall, whose contacts do not count
+    stated, classes = exchanged(radius, rows, step)
+    wrong = np.flatnonzero(stated != radius)
+    assert len(wrong) >= 2
+    found = find_exchanged_sizes(position, stated, classes)
+    assert np.array_equal(found, radius)
+
+
+def test_a_lost_grain_keeps_its_size(packing) -> None:
+    position, radius, classes = packing
+    seen = position.copy()
+    seen[:, 12] = np.nan
+    assert np.array_equal(find_exchanged_sizes(seen, radius, classes), radius)
+    assert np.array_equal(find_exchanged_sizes(np.full_like(seen, np.nan), radius, classes), radius)
+
+
+def test_overlaps_of_soft_grains_show_no_size(packing) -> None:
+    position, radius, _ = packing
+    stated, classes = exchanged(radius, [7, 22, 31, 44], 1)
+    middle = position.mean(axis=1, keepdims=True)
+    soft = middle + 0.97 * (position - middle)
+    assert np.array_equal(find_exchanged_sizes(soft, stated, classes), stated)
+
+
+def test_nothing_is_exchanged_where_most_would_be(packing) -> None:
+    position, radius, _ = packing
+    stated, classes = exchanged(radius, list(range(0, len(radius), 2)), 1)
+    assert np.array_equal(find_exchanged_sizes(position, stated, classes), stated)
