@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 import signal
@@ -103,6 +104,12 @@ def page(browser: Browser) -> Iterator[Page]:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Run tests with a browser last: its driver keeps an event loop in this thread until the end."""
     items.sort(key=lambda item: ("browser" in getattr(item, "fixturenames", ()), rank_of(item.nodeid)))
+
+
+def pytest_collection_finish() -> None:
+    """Leave the tests and all modules that they import out of later searches for unreachable objects: they stay."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import io
 import json
 import os
@@ -92,6 +93,7 @@ def _run_batch(cases: list[Case], statuses: tuple[int, ...]) -> tuple[int, list[
     child = os.fork()
     if child == 0:
         os.close(read)
+        gc.freeze()  # or a search for unreachable objects copies every page of this process
         with os.fdopen(write, "w") as stream:
             _limit()
             for number, (name, make) in enumerate(cases):
@@ -124,6 +126,7 @@ def run_in_fork(work: Callable[[], Any]) -> Any:
         status = 1
         try:
             os.close(read)
+            gc.freeze()
             with os.fdopen(write, "w") as stream:
                 json.dump(work(), stream)
             status = 0

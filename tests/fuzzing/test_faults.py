@@ -16,7 +16,7 @@ from .cases import FEW
 from .faults import ERRORS, KINDS, FileFault, forces_of, install_fault, limit_files, refuse_stores
 from .table import FAULTS, note
 
-QUICK = 8
+QUICK = 5
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ import pytest
 # repeated. The kernels are compared with plain twins in tests/reference, those of the posterior with integrals.
 COMPILED_ALONE = (
     "calibration", "convex", "dem", "sequence", "test_acceleration.py", "test_refinement.py", "test_frame_posterior.py",
-    "test_radii.py", "test_simulated_forces.py",
+    "test_radii.py", "test_simulated_forces.py", "test_changes.py", "test_kinematics.py",
 )  # fmt: skip
 
 

@@ -73,7 +73,7 @@ def run(code: str, *arguments: object) -> subprocess.CompletedProcess[str]:
     return done
 
 
-@pytest.mark.parametrize("folder", ["made_tracks", pytest.param("made_photographs", marks=pytest.mark.screen)])
+@pytest.mark.parametrize("folder", ["made_tracks", pytest.param("made_photographs", marks=pytest.mark.slow)])
 def test_a_node_of_a_cluster_solves_without_the_other_packages(folder, tmp_path, request):
     run(f"{HIDE}\n{COMMANDS['solve']}", request.getfixturevalue(folder), tmp_path / "run")
     assert (tmp_path / "run/results.h5").is_file()

@@ -104,12 +104,18 @@ def test_it_is_opened_in_python_with_a_warning(root):
     assert "out of date" in repr(opened)
 
 
+@pytest.fixture(scope="module")
+def made_neighbour(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Another experiment of the same name; not to be written to."""
+    folder = tmp_path_factory.mktemp("neighbour") / "tracked"
+    synthesize(folder, SynthesisSettings(grains=30, frames=5, photographs=False, noise=1e-5, seed=7))
+    return folder
+
+
 @pytest.fixture
-def neighbour(root: Path, tmp_path: Path) -> Path:
-    """Another experiment of the same name, in the same place of another folder."""
-    synthesize(
-        tmp_path / "other" / "tracked", SynthesisSettings(grains=30, frames=5, photographs=False, noise=1e-5, seed=7)
-    )
+def neighbour(made_neighbour: Path, tmp_path: Path) -> Path:
+    """A copy of it, in the same place of another folder."""
+    shutil.copytree(made_neighbour, tmp_path / "other" / "tracked")
     return tmp_path / "other"
 
 

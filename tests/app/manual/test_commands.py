@@ -1,8 +1,8 @@
 """Every command in the pages runs on a tiny experiment: twenty rods, four photographs.
 
-A command that computes for seconds is a slow test if another one has all its options. A further slow test runs the
-same commands on the sample. Three tables list the differences from the pages, each with its reason: LEFT_OUT, SMALLER
-and ADDED.
+A command that computes for seconds is a slow test if another one, or another room's test, has all its options. A
+further slow test runs the same commands on the sample. Four tables list the differences from the pages, each with its
+reason: LEFT_OUT, SMALLER, ADDED and LATER.
 """
 
 from __future__ import annotations
@@ -60,10 +60,11 @@ SMALLER = {
     "--frame 11": ("--frame 3", "there are four photographs"),
     "--preset small --seed": ("--preset small --grains 20 --frames 3 --seed", "250 rods take half a minute"),
     "--preset paper --seed 1": ("--preset paper --seed 1 --grains 20", "1172 rods take minutes"),
-    "--no-photographs --frames 200": ("--no-photographs --grains 40 --frames 20", "1172 rods take minutes"),
+    "--no-photographs --frames 200": ("--no-photographs --grains 40 --frames 6", "1172 rods take minutes"),
     "--grains 300 --frames 60": ("--grains 40 --frames 6", "300 rods take half a minute"),
     "--preset fringes": ("--preset fringes --grains 40", "the fringes of each disc are computed"),
     "--preset shear --no-photographs": ("--preset shear --no-photographs --grains 60", "450 rods take a minute"),
+    "study fringes --seeds 4 5 6": ("study fringes --seeds 4 --grains 40", "200 discs take minutes"),
     "--grains 150": ("--grains 60", "simulated anew"),
     "--ensemble 8": ("--ensemble 2", "each is solved again"),
 }
@@ -74,6 +75,22 @@ ADDED = {
     "sensitivity sample_data/shear": ("--factors friction=0.7:1.3", "each of a dozen factors is solved several times"),
     "campaign": ("--no-recordings", "each starts a process of its own"),
     "campaign sample_data/campaign.csv": ("--dry", "the form with --workers 2 runs"),
+}
+# Commands that compute for seconds and run in the slow lane alone: their beginning, and the room whose fast tests use
+# the same options. That their arguments are valid is tested for every command.
+LATER = {
+    "synth big --preset 1g2e": "tests/app/synthetic",
+    "synth lab": "tests/app/synthetic",
+    "synth test --preset fringes": "tests/app/synthetic",
+    "study fringes": "tests/app/synthetic",
+    "study worlds": "tests/app/study",
+    "campaign": "tests/app/campaigns",
+    "export figures": "tests/app/figures",
+    "run my_test --ensemble": "tests/app/robustness",
+    "run my_test --follow": "tests/app/following",
+    "run try": "tests/app/cli",
+    "sensitivity my_test": "tests/app/robustness",
+    "share runs/shear --frames": "tests/app/recording/archive",
 }
 MADE_BY = {"synth": 1, "init": 1, "import": 3}  # index of the word with the folder that a command creates
 COSTLY = ("export", "init", "run", "sensitivity", "share", "synth", "track")  # compute for seconds
@@ -113,7 +130,8 @@ def repeats(number: int) -> bool:
 def marks(number: int) -> list[pytest.MarkDecorator]:
     if DONE[number][:2] in DRAWN:
         return [pytest.mark.screen]
-    return [pytest.mark.slow] if repeats(number) else []
+    later = any(shlex.join(DONE[number]).startswith(start) for start in LATER)
+    return [pytest.mark.slow] if later or repeats(number) else []
 
 
 @pytest.fixture(scope="module")
@@ -258,6 +276,9 @@ def test_every_exception_applies_to_a_page():
     lines = [shlex.join(words) for words in COMMANDS]
     for start in LEFT_OUT:
         assert any(line.startswith(start) for line in lines), start
+    for start, room in LATER.items():
+        assert any(line.startswith(start) for line in lines), start
+        assert (ROOT / room).is_dir(), room
     for which in ADDED:
         assert any(which in (line, line.split()[0]) for line in lines), which
     for more in SMALLER:

@@ -25,6 +25,7 @@ def test_the_fit_recovers_the_constants_of_simulated_errors():
     assert (a, b) == pytest.approx((0.5, 0.8), rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_study_prints_coverages_and_constants(tmp_path, monkeypatch):
     truth = simulate(0, grains=30, folder=tmp_path, reversal_angle=3.0)
     monkeypatch.setattr("rodsight.study.report.uncertainty.simulate", lambda *_, **__: truth)

@@ -248,6 +248,7 @@ def test_a_reversal_changes_direction_half_way(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.rad2deg(shear), [0.0, 0.25, 0.5, 0.25, 0.0], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_small_preset_puts_a_rearrangement_among_its_photographs(tmp_path: Path) -> None:
     small = synthesize(
         tmp_path / "small", SynthesisSettings(preset="small", photographs=False, grains=30, frames=8, step_degrees=0.5)
