@@ -20,6 +20,7 @@ from scipy.spatial import KDTree
 from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
 from ...solver.parallel import available_cores, parallel_map
+from ..correlation.edge_width import SharpCopy, sharpest_copy
 from .circle_measurement import CIRCLES_PER_THREAD, CircleMeasurer, MeasuredCircle
 from .discs import OVERLAP, Discs, find_discs
 from .rings import Circles, find_circles, without_overlap
@@ -55,6 +56,9 @@ CLEAN_COVER_REST = 0.8
 DISC_PASSES = 4
 # Fraction of the bright area left, below which all grains are found.
 MAX_BRIGHT_LEFT = 0.01
+
+# Least radius [px] on a copy of a soft photograph: smaller ones are not shrunk any further.
+LEAST_ON_COPY = 8.0
 
 # Ratio of successive radii in the search for circles of unknown radius.
 SCAN_STEP = 1.06
@@ -97,8 +101,42 @@ class Detection:
 
 
 def detect_grains(image: Image, settings: DetectionSettings | None = None) -> Detection:
-    """Find the grains of a photograph (H, W) [grey]."""
+    """Find the grains of a photograph (H, W) [grey]; where its edges are soft, on a copy where they are sharp."""
     settings = settings if settings is not None else DetectionSettings()
+    copy = sharpest_copy(image, _most_shrunk(settings))
+    return _on_photograph(_detect(copy.image, _for_copy(settings, copy.factor)), copy, settings.radii)
+
+
+def _most_shrunk(settings: DetectionSettings) -> float:
+    """Return the greatest factor by which a photograph may be shrunk; the default range is one of the copy."""
+    if settings.radii:
+        return min(settings.radii) / LEAST_ON_COPY
+    return np.inf if settings.radius_range is None else settings.radius_range[0] / MIN_RADIUS
+
+
+def _for_copy(settings: DetectionSettings, factor: float) -> DetectionSettings:
+    if factor == 1.0:
+        return settings
+    ends = settings.radius_range
+    return replace(
+        settings,
+        radii=tuple(radius / factor for radius in settings.radii),
+        radius_range=None if ends is None else (ends[0] / factor, ends[1] / factor),
+    )
+
+
+def _on_photograph(found: Detection, copy: SharpCopy, classes: tuple[float, ...] = ()) -> Detection:
+    """Convert what was found on a copy; known radii keep their exact values."""
+    if copy.factor == 1.0:
+        return found
+    x, y = copy.from_copy(found.x, found.y)
+    radius, known = copy.factor * found.radius, np.array(sorted(classes))
+    if len(known) and found.count:
+        radius = known[np.abs(known[:, None] - radius).argmin(axis=0)]
+    return Detection(x, y, radius, copy.factor * found.sigma, found.quality)
+
+
+def _detect(image: Image, settings: DetectionSettings) -> Detection:
     known = bool(settings.radii)
     radii = (
         np.array(sorted(set(settings.radii)))
@@ -172,7 +210,11 @@ def refine_grains(image: Image, x: Array, y: Array, radius: Array, *, fixed_radi
     x, y, radius = (np.asarray(value, dtype=np.float64) for value in (x, y, radius))
     if len(x) == 0:
         return Detection(x, y, radius, np.empty(0), np.empty(0))
-    return _refine(CircleMeasurer(image, float(radius.max())), x, y, radius, fixed_radius=fixed_radius)
+    copy = sharpest_copy(image, float(radius.min()) / LEAST_ON_COPY)
+    rough = *copy.to_copy(x, y), radius / copy.factor
+    measurer = CircleMeasurer(copy.image, float(rough[2].max()))
+    found = _on_photograph(_refine(measurer, *rough, fixed_radius=fixed_radius), copy)
+    return replace(found, radius=radius) if fixed_radius else found
 
 
 def _refine(measurer: CircleMeasurer, x: Array, y: Array, radius: Array, *, fixed_radius: bool) -> Detection:
