@@ -38,7 +38,7 @@ def test_load_of_the_ring_is_carried_by_three_rods_to_the_core() -> None:
 def test_rod_rolls_between_fixed_ring_and_rotating_core() -> None:
     cell = rods(0.0, squeezed=2e-5)
     cell.rest()
-    rotation = 0.4
+    rotation = 0.2
     cell.move_core((0.0, 0.0), rotation)
     x, y = cell.position[0]
     middle = 0.5 * CORE * rotation / (CORE + RADIUS)  # its centre moves at half the speed of the core's surface
