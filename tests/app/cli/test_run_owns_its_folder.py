@@ -150,8 +150,8 @@ def test_damaged_results_are_not_read(tracked, tmp_path, capsys):
 def test_a_file_that_changes_while_it_is_used_ends_the_run(tracked, tmp_path, capsys, monkeypatch):
     read, changed = InputFiles.read, []
 
-    def changing(self: InputFiles, file: Path) -> bytes:
-        content = read(self, file)
+    def changing(self: InputFiles, file: Path, **options: bool) -> bytes:
+        content = read(self, file, **options)
         if file.name == "tracks.csv" and not changed:
             changed.append(file)
             file.write_bytes(content.replace(b"0.1", b"0.2", 1))
