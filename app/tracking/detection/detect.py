@@ -23,7 +23,7 @@ from ...solver.parallel import available_cores, parallel_map
 from ..correlation.edge_width import SharpCopy, sharpest_copy
 from .circle_measurement import CIRCLES_PER_THREAD, CircleMeasurer, MeasuredCircle
 from .discs import OVERLAP, Discs, find_discs
-from .rings import Circles, find_circles, without_overlap
+from .rings import Circles, find_circles, not_overlapping, without_overlap
 
 # Least half width of the search for the edges of a ring [px], whose centre has an error of that size or larger.
 RING_UNCERTAINTY = 3.0
@@ -283,10 +283,15 @@ def _judge(
     """
     unjudged = np.ones(len(rough.x), dtype=np.bool_)
     judged_circles = np.full((len(rough.x), 4), np.nan)  # x, y, radius, quality of those that were measured
-    tree = KDTree(np.stack([rough.x, rough.y], axis=1)) if known and len(rough.x) else None
+    places = np.stack([rough.x, rough.y, rough.radius], axis=1)
+    overlapped = np.full_like(places, np.nan)  # x, y, radius of the circle in the table that overlapped each one last
+    tree = KDTree(places[:, :2]) if known and len(rough.x) else None
     while True:
         left = np.flatnonzero(unjudged)
-        left = left[_not_overlapping(rough.x[left], rough.y[left], rough.radius[left], table, allowed=0.6)]
+        circles, beside = places[left], overlapped[left]
+        apart = not_overlapping(circles, table, beside, allowed=0.6)
+        overlapped[left] = beside
+        left = left[apart]
         if len(left) == 0:
             return table
         # A candidate may remove a true circle and then prove no grain itself, or be removed later by a better circle.
@@ -344,20 +349,6 @@ def _window(radius: float, known: bool) -> float:
     """Half width of the search for edges around a rough circle [px]: narrower for small grains, beside neighbours."""
     window = min(RING_UNCERTAINTY, max(SMALL_FRACTION * radius, 0.5 * RING_UNCERTAINTY))
     return window if known else max(window, 0.6 * (SCAN_STEP - 1.0) * radius)
-
-
-def _not_overlapping(x: Array, y: Array, radius: Array, found: Array, *, allowed: float) -> NDArray[np.bool_]:
-    """Which circles overlap none of the found ones, x, y, radius, … (c, 4), by more than the fraction `allowed`."""
-    if len(found) == 0 or len(x) == 0:
-        return np.ones(len(x), dtype=np.bool_)
-    tree, apart = KDTree(found[:, :2]), np.ones(len(x), dtype=np.bool_)
-    for count in (1, min(8, len(found))):  # most overlaps are with the nearest one
-        rows = np.flatnonzero(apart)
-        nearest = tree.query(np.stack([x[rows], y[rows]], axis=1), k=count)
-        distance, index = (np.reshape(each, (len(rows), count)) for each in nearest)
-        size, other = radius[rows, None], found[index, 2]
-        apart[rows] = (distance >= size + other - allowed * np.minimum(size, other)).all(axis=1)
-    return apart
 
 
 def _measure_each(count: int, one: Callable[[int], MeasuredCircle]) -> list[MeasuredCircle]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
@@ -10,6 +11,7 @@ from numba import njit
 
 from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
+from ...solver.parallel import parallel_map
 from ..correlation.splines import shrink
 
 # Circles are searched for on shrunk photographs, where the smallest has at least the first radius [px], and each about
@@ -17,6 +19,9 @@ from ..correlation.splines import shrink
 MIN_COARSE_RADIUS = 10.0
 COARSE_RADIUS = 20.0
 PEAK_ERROR = 1.5  # greatest error of a circle's centre [px of the shrunk photograph]
+
+# Greatest number of pixels on which several radii are searched for at a time, to save memory.
+PARALLEL_PIXELS = 12_000_000
 
 # Greatest radius [px] that sets the size of the tiles of local contrast: uneven light does not scale with the grains.
 LARGEST_LOCAL = 80.0
@@ -55,18 +60,25 @@ def find_circles(image: Image, radii: Array, *, min_score: float) -> Circles:
     factors = np.maximum((radii / COARSE_RADIUS).astype(np.intp), least)
     found = []
     for factor in np.unique(factors):
-        slope_x, slope_y = _slopes(shrink(image, int(factor)), int(tile_size(float(radii.max())) / factor))
-        for radius in radii[factors == factor]:
-            score = _ring_response(slope_x, slope_y, radius / factor)
-            peak = (score == cv2.dilate(score, np.ones((5, 5), np.uint8))) & (score > min_score)
-            row, column = np.nonzero(peak)
-            place = [axis * factor + 0.5 * (factor - 1) for axis in (column, row)]
-            error = PEAK_ERROR * factor
-            found.append(np.stack([*place, *np.broadcast_arrays(radius, score[peak], error)], axis=1))
+        slopes = _slopes(shrink(image, int(factor)), int(tile_size(float(radii.max())) / factor))
+        searches = [
+            partial(_peaks, *slopes, float(radius), int(factor), min_score) for radius in radii[factors == factor]
+        ]
+        found += parallel_map(searches, None if slopes[0].size < PARALLEL_PIXELS else 1)
     table = np.concatenate(found)
     # A mean over a longer circle is more significant at the same value.
     table = table[np.argsort(-table[:, 3] * np.sqrt(table[:, 2]), kind="stable")]
     return Circles(*table.T)
+
+
+def _peaks(slope_x: Image, slope_y: Image, radius: float, factor: int, min_score: float) -> Array:
+    """Return x, y, radius, score, error (c, 5) of the candidates of one radius [px of the photograph]."""
+    score = _ring_response(slope_x, slope_y, radius / factor)
+    peak = (score == cv2.dilate(score, np.ones((5, 5), np.uint8))) & (score > min_score)
+    row, column = np.nonzero(peak)
+    place = [axis * factor + 0.5 * (factor - 1) for axis in (column, row)]
+    table = np.stack([*place, *np.broadcast_arrays(radius, score[peak], PEAK_ERROR * factor)], axis=1)
+    return np.asarray(table, np.float64)
 
 
 def without_overlap(x: Array, y: Array, radius: Array, *, allowed: float) -> np.ndarray:
@@ -118,6 +130,78 @@ def strike_out(x, y, radius, allowed, cell, head, following, alive):
         if alive[k]:
             following[k] = head[row, column]
             head[row, column] = k
+
+
+def not_overlapping(circles: Array, found: Array, overlapped: Array, *, allowed: float) -> np.ndarray:
+    """Return which circles overlap none of the found ones.
+
+    Parameters
+    ----------
+    circles : (n, 3) array
+        x, y, radius [px].
+    found : (c, 3 or more) array
+        x, y, radius, … [px].
+    overlapped : (n, 3) array
+        The found circle that each one overlapped at the last call, NaN at first; updated. While it is still found,
+        there is no need to look for another.
+    allowed : float
+        Greatest overlap, as a fraction of the smaller radius.
+    """
+    apart = np.ones(len(circles), dtype=np.bool_)
+    if len(found) == 0 or len(circles) == 0:
+        return apart
+    found = np.ascontiguousarray(found[:, :3], np.float64)
+    cell = float(found[:, 2].max())
+    columns, rows = (int(np.ptp(found[:, axis]) / cell) + 1 for axis in (0, 1))
+    head = np.full((rows, columns), -1, np.intp)
+    strike_out_beside(circles, found, overlapped, allowed, head, np.empty(len(found), np.intp), apart)
+    return apart
+
+
+@njit(cache=True, nogil=True)
+def strike_out_beside(circles, found, overlapped, allowed, head, following, apart):
+    """Clear apart (n,) where a circle overlaps one of the found ones, see `not_overlapping`.
+
+    head (rows, columns), −1 at first, and following (c,) are workspace: linked lists of the found circles in each
+    square of a grid, whose side is the greatest radius found.
+    """
+    rows, columns = head.shape
+    left, top, cell = found[0, 0], found[0, 1], found[0, 2]
+    for k in range(1, len(found)):
+        left, top, cell = min(left, found[k, 0]), min(top, found[k, 1]), max(cell, found[k, 2])
+    for k in range(len(found)):
+        column, row = int((found[k, 0] - left) / cell), int((found[k, 1] - top) / cell)
+        following[k] = head[row, column]
+        head[row, column] = k
+    for k in range(len(circles)):
+        x, y, radius = circles[k]
+        reach = radius + cell
+        # The square of the last one first, which may lie outside the grid by now.
+        for step in range(2):
+            if step == 0:
+                if np.isnan(overlapped[k, 0]):
+                    continue
+                column, row = np.floor((overlapped[k, 0] - left) / cell), np.floor((overlapped[k, 1] - top) / cell)
+                first, last, upper, lower = int(column), int(column), int(row), int(row)
+            else:
+                first, last = int(np.floor((x - reach - left) / cell)), int(np.floor((x + reach - left) / cell))
+                upper, lower = int(np.floor((y - reach - top) / cell)), int(np.floor((y + reach - top) / cell))
+            for j in range(max(upper, 0), min(lower + 1, rows)):
+                for i in range(max(first, 0), min(last + 1, columns)):
+                    other = head[j, i]
+                    while other >= 0 and apart[k]:
+                        size = found[other, 2]
+                        distance = np.sqrt((found[other, 0] - x) ** 2 + (found[other, 1] - y) ** 2)
+                        if distance < radius + size - allowed * min(radius, size):
+                            apart[k] = False
+                            overlapped[k] = found[other]
+                        other = following[other]
+                    if not apart[k]:
+                        break
+                if not apart[k]:
+                    break
+            if not apart[k]:
+                break
 
 
 def tile_size(radius: float) -> int:
