@@ -8,7 +8,8 @@ import numpy as np
 from numba import njit
 
 from ..short_sort import ascending_order
-from .edges import centre_variance, fit_points, trace, weighted_median
+from .edges import DENSITY, MARGIN, centre_variance, fit_points, trace, weighted_median
+from .rim_profile import fit_rim
 
 # Least slope of an edge per pixel, as a fraction of the local contrast, and the slope from which its weight is full.
 EDGE_SLOPE, SURE_SLOPE = 0.08, 0.3
@@ -23,6 +24,13 @@ ON_CIRCLE = 0.7
 SMALL = 12.0
 ONE_SIDED = 0.55
 MIN_SCALE = 0.1  # [px] residuals of steepest points below it are never outliers
+MIN_SCALE_CLOSE = 0.05  # [px] the same of the edges of a fitted profile
+CLOSE_WINDOW = 2.0  # [px] half width of the search for the steepest points from which profiles are fitted
+ROUNDS = 3  # of the fit of the profiles
+# Level of a profile, as a fraction of the local contrast, from which its weight is full, and its least weight.
+SURE_LEVEL, LEAST_WEIGHT = 0.6, 0.05
+# Remaining effect of the rim's shading on the centre, over the effect that the model of the rim removes.
+SHADING_LEFT = 1.2
 
 
 @njit(cache=True, nogil=True)
@@ -75,6 +83,69 @@ def measure_circles(coefficients, dark, contrast, rough, rules, out):
         out[c, 0], out[c, 1], out[c, 2] = there[0], there[1], there[2] - shift
         out[c, 3] = np.sqrt(variance) if variance >= 0.0 else np.inf
         out[c, 4] = on.sum() / viewed
+
+
+@njit(cache=True, nogil=True)
+def measure_closely(coefficients, dark, contrast, rough, rules, width, out):
+    """Fit circles through the edges that the fitted profiles of the rims give.
+
+    Parameters
+    ----------
+    coefficients, dark, contrast, out : array
+        As in `measure_circles`.
+    rough : (c, 5) array
+        x, y, radius [px]; excess of the edges' radius over the grain's [px]; standard deviation of the radius [px],
+        infinite: it is free.
+    rules : (c, 6) array
+        As in `measure_circles`.
+    width : float
+        Width of the blur [px].
+    """
+    for c in range(len(rough)):
+        x, y, radius, shift, radius_sd = rough[c]
+        excess, narrow, fraction, fewest, enough, min_view = rules[c]
+        out[c, 0], out[c, 1], out[c, 2], out[c, 3], out[c, 4] = x, y, radius, np.nan, 0.0
+        wanted = radius + shift
+        angle, rays, edges, in_view = trace(coefficients, x, y, wanted, CLOSE_WINDOW, narrow != 0.0)
+        seen = np.zeros(len(angle), np.bool_)
+        local = see_edges(edges, dark, contrast, x, y, excess, seen)
+        viewed = in_view.sum()
+        least = max(min(enough, np.rint(fraction * len(angle))), fewest)
+        if seen.sum() < least or viewed / len(angle) < min_view:
+            continue
+        at, distance = angle[seen], edges[:, 0][seen]
+        weight = edges[:, 1][seen].astype(np.float32) / np.float32(SURE_SLOPE * local)
+        weight = np.minimum(weight, np.float32(1.0)) ** 2
+        residual, w = np.empty_like(distance), np.empty_like(distance)
+        steepest, _, _, _ = fit_points(
+            at, distance, weight.astype(np.float64), wanted, weighted_median(distance - wanted, weight), np.inf,
+            MIN_SCALE, residual, w,
+        )  # fmt: skip
+        for p in range(len(angle)):
+            if not seen[p]:
+                edges[p, 0] = np.nan
+        first = wanted - CLOSE_WINDOW - MARGIN
+        fitted, darks = fit_rim(rays, first, 1.0 / DENSITY, edges[:, 0].copy(), angle, width, width, ROUNDS)
+        good = np.isfinite(fitted[:, 0])
+        if good.sum() < least:
+            continue
+        at, distance, level, darks = angle[good], fitted[:, 0][good], fitted[:, 1][good], darks[good]
+        above, strength = lowest_tenth(darks), np.empty_like(distance)
+        for p in range(len(at)):
+            clear = 1.0 - (darks[p] - above) / (excess * local)
+            clear = min(max(clear, LEAST_WEIGHT), 1.0)
+            strength[p] = (min(level[p] / (SURE_LEVEL * local), 1.0) * clear) ** 2
+        start = weighted_median(distance - wanted, strength) if np.isinf(radius_sd) else 0.0
+        residual, w = np.empty_like(distance), np.empty_like(distance)
+        moved, scale, inverse, score = fit_points(
+            at, distance, strength, wanted, start, radius_sd, MIN_SCALE_CLOSE, residual, w
+        )
+        variance = centre_variance(at, wanted, w, score, inverse, scale, radius_sd)
+        sigma = np.sqrt(variance) if variance >= 0.0 else np.inf
+        shaded = np.hypot(x + moved[0] - (x + steepest[0]), y + moved[1] - (y + steepest[1])) / np.sqrt(2.0)
+        out[c, 0], out[c, 1], out[c, 2] = x + moved[0], y + moved[1], wanted + moved[2] - shift
+        out[c, 3] = np.hypot(sigma, SHADING_LEFT * shaded)
+        out[c, 4] = (np.abs(residual) < ON_CIRCLE).sum() / viewed
 
 
 @njit(cache=True, nogil=True)

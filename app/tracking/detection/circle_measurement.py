@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -14,8 +14,8 @@ from ...solver.bodies.grains import Array
 from ...solver.parallel import available_cores, parallel_map
 from ..correlation.noise import image_noise
 from ..correlation.splines import spline_coefficients
-from .circle_kernels import DARK_HALF, ON_CIRCLE, SMALL, SURE_SLOPE, lowest_tenth, measure_circles, see_edges
-from .edges import DENSITY, Circle, Outline, fit_circle, trace_outline
+from .circle_kernels import DARK_HALF, SMALL, measure_circles, measure_closely, see_edges
+from .edges import DENSITY, Outline, trace_outline
 from .rim_profile import locate_edges
 from .rings import local_contrast, tile_size
 
@@ -44,8 +44,8 @@ TYPICAL_BLUR = 0.7
 BLUR_EXTENT = 1.0
 BLUR_ROUNDS = 2
 
-# Remaining effect of the rim's shading on the centre, over the effect that the model of the rim removes.
-SHADING_LEFT = 1.2
+
+Kernel = Callable[..., None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,61 +102,47 @@ class CircleMeasurer:
         (c, 5) array
             x, y, radius, sigma, quality as in `MeasuredCircle`; NaN and 0 where there is no circle.
         """
-        found = np.empty((len(rough), 5))
-        radius = rough[:, 2]
-        small, count = radius <= SMALL, len(rough)
-        fraction, fewest = self._min_seen()
-        rules = np.column_stack([
-            np.full(count, DARK_HALF if self.plain else DARK_EXCESS_JUDGED), small | self.plain,
-            np.full(count, fraction), np.full(count, fewest), np.full(count, MIN_POINTS),
-            np.where(small & (not self.plain), MIN_VIEW_SMALL, MIN_VIEW),
-        ])  # fmt: skip
-        parts = np.array_split(np.arange(count), max(min(available_cores(), count // CIRCLES_PER_THREAD), 1))
-        parallel_map([partial(self._measure, rough, rules, found, part) for part in parts], None)
-        return found
+        return self._in_parts(measure_circles, rough, DARK_HALF if self.plain else DARK_EXCESS_JUDGED)
 
-    def _measure(self, rough: Array, rules: Array, found: Array, part: NDArray[np.intp]) -> None:
-        if len(part):
-            rows = slice(part[0], part[-1] + 1)
-            measure_circles(self._coefficients, self._dark, self._contrast, rough[rows], rules[rows], found[rows])
-
-    def measure_closely(
-        self, x: float, y: float, radius: float, width: float, shift: float, radius_sd: float
-    ) -> MeasuredCircle:
-        """Fit a circle through the edges that the fitted profile of the rim gives.
+    def measure_closely(self, rough: Array, width: float) -> Array:
+        """Fit circles through the edges that the fitted profile of the rim gives.
 
         Parameters
         ----------
-        x, y, radius : float
-            Rough circle [px].
+        rough : (c, 5) array
+            x, y, radius [px]; excess of the edges' radius over the grain's [px]; standard deviation of the radius [px],
+            infinite: it is free.
         width : float
             Width of the blur [px].
-        shift : float
-            Excess of the edges' radius over the grain's [px].
-        radius_sd : float
-            Standard deviation of the radius [px]; infinite: it is free.
+
+        Returns
+        -------
+        (c, 5) array
+            As from `measure`.
         """
-        outline = trace_outline(self._coefficients, x, y, radius + shift, 2.0, narrow=self.narrow(radius))
-        seen, local = self._edges(outline, x, y, DARK_EXCESS)
-        if seen.sum() < self._min_points(outline) or outline.in_view.mean() < self._min_view(radius):
-            return MeasuredCircle(x, y, radius, np.nan, 0.0)
-        steepest = fit_circle(
-            (x, y, radius + shift), outline.angle[seen], outline.distance[seen],
-            np.minimum(outline.strength[seen] / (SURE_SLOPE * local), 1.0) ** 2, radius_sd=np.inf, min_scale=0.1,
-        )  # fmt: skip
-        edge, level, _, dark = _fit_profiles(outline, seen, width, width)
-        good = np.isfinite(edge)
-        if good.sum() < self._min_points(outline):
-            return MeasuredCircle(x, y, radius, np.nan, 0.0)
-        excess = (dark[good] - lowest_tenth(dark[good])) / (DARK_EXCESS * local)
-        weight = (np.minimum(level[good] / (0.6 * local), 1.0) * np.clip(1.0 - excess, 0.05, 1.0)) ** 2
-        circle = fit_circle(
-            (x, y, radius + shift), outline.angle[good], edge[good], weight, radius_sd=radius_sd, min_scale=0.05
-        )
-        moved = np.hypot(circle.x - steepest.x, circle.y - steepest.y) / np.sqrt(2.0)
-        found = _measured(circle, outline, shift)
-        sigma = float(np.hypot(circle.sigma, SHADING_LEFT * moved))
-        return MeasuredCircle(found.x, found.y, found.radius, sigma, found.quality)
+        return self._in_parts(measure_closely, rough, DARK_EXCESS, width)
+
+    def _in_parts(self, kernel: Kernel, rough: Array, excess: float, *further: float) -> Array:
+        """Measure circles on all cores; excess: greatest one of the dark, as a fraction of the contrast."""
+        found, rules = np.empty((len(rough), 5)), self._rules(rough[:, 2], excess)
+
+        def some(part: NDArray[np.intp]) -> None:
+            if len(part):
+                rows = slice(part[0], part[-1] + 1)
+                kernel(self._coefficients, self._dark, self._contrast, rough[rows], rules[rows], *further, found[rows])
+
+        parts = np.array_split(np.arange(len(rough)), max(min(available_cores(), len(rough) // CIRCLES_PER_THREAD), 1))
+        parallel_map([partial(some, part) for part in parts], None)
+        return found
+
+    def _rules(self, radius: Array, excess: float) -> Array:
+        """The rules of `measure_circles` (c, 6) for circles of radii (c,)."""
+        small, count = radius <= SMALL, len(radius)
+        fraction, fewest = self._min_seen()
+        return np.column_stack([
+            np.full(count, excess), small | self.plain, np.full(count, fraction), np.full(count, fewest),
+            np.full(count, MIN_POINTS), np.where(small & (not self.plain), MIN_VIEW_SMALL, MIN_VIEW),
+        ])  # fmt: skip
 
     def estimate_blur(self, circles: Sequence[MeasuredCircle], *, most: int = 60) -> float:
         """Estimate the width of the photograph's blur [px]: that with the best fits of the profiles of some grains."""
@@ -178,13 +164,6 @@ class CircleMeasurer:
         seen = np.zeros(len(outline.angle), np.bool_)
         local = see_edges(outline.edges, self._dark, self._contrast, x, y, excess, seen)
         return seen, local
-
-    def _min_view(self, radius: float) -> float:
-        return MIN_VIEW if self.plain or radius > SMALL else MIN_VIEW_SMALL
-
-    def _min_points(self, outline: Outline) -> int:
-        fraction, fewest = self._min_seen()
-        return max(min(MIN_POINTS, round(fraction * len(outline.angle))), fewest)
 
     def _min_seen(self) -> tuple[float, int]:
         """Least fraction and number of the rays that must meet an edge."""
@@ -219,8 +198,3 @@ def _fit_profiles(
 ) -> tuple[Array, Array, Array, Array]:
     start = np.where(seen, outline.distance, np.nan)
     return locate_edges(outline.rays, (outline.first, 1.0 / DENSITY), start, outline.angle, width, extent=extent)
-
-
-def _measured(circle: Circle, outline: Outline, shift: float) -> MeasuredCircle:
-    on = (np.abs(circle.residual) < ON_CIRCLE).sum()
-    return MeasuredCircle(circle.x, circle.y, circle.radius - shift, circle.sigma, float(on / outline.in_view.sum()))

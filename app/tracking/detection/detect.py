@@ -9,9 +9,7 @@ centre.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +17,8 @@ from scipy.spatial import KDTree
 
 from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
-from ...solver.parallel import available_cores, parallel_map
 from ..correlation.edge_width import SharpCopy, sharpest_copy
-from .circle_measurement import CIRCLES_PER_THREAD, CircleMeasurer, MeasuredCircle
+from .circle_measurement import CircleMeasurer, MeasuredCircle
 from .discs import OVERLAP, Discs, find_discs
 from .rings import Circles, find_circles, not_overlapping, without_overlap
 
@@ -223,33 +220,30 @@ def _refine(measurer: CircleMeasurer, x: Array, y: Array, radius: Array, *, fixe
     window = np.minimum([_window(each, True) for each in radius], 2.0)
     first = [MeasuredCircle(*one) for one in measurer.measure(_rough(x, y, radius, window, np.inf)).tolist()]
     width = measurer.estimate_blur(first)
-    free = _measure_each(
-        len(x),
-        lambda k: _better_measurement(
-            measurer, first[k], measurer.measure_closely(*first[k].circle, width, 0.0, np.inf)
-        ),
-    )
+    rough = np.array([(*one.circle, one.sigma, one.quality) for one in first])
+    free = _better(measurer, rough, measurer.measure_closely(_close(rough, 0.0, np.inf), width))
     if not fixed_radius:
-        return _detection(free, np.array([one.radius for one in free]))
-    excess = np.array([one.radius for one in free]) - radius
+        return Detection(free[:, 0], free[:, 1], free[:, 2], free[:, 3], free[:, 4])
+    excess = free[:, 2] - radius
     shift = float(np.median(excess))
     # The rims' shading differs from grain to grain, so their radii deviate from the common shift.
     radius_sd = max(1.4826 * float(np.median(np.abs(excess - shift))), 0.01)
-    tied = _measure_each(
-        len(x),
-        lambda k: _better_measurement(
-            measurer, free[k], measurer.measure_closely(free[k].x, free[k].y, radius[k], width, shift, radius_sd)
-        ),
-    )  # fmt: skip
-    return _detection(tied, radius)
+    known = np.column_stack([free[:, :2], radius])
+    tied = _better(measurer, free, measurer.measure_closely(_close(known, shift, radius_sd), width))
+    return Detection(tied[:, 0], tied[:, 1], radius, tied[:, 3], tied[:, 4])
 
 
-def _better_measurement(measurer: CircleMeasurer, rough: MeasuredCircle, close: MeasuredCircle) -> MeasuredCircle:
-    """The close measurement, or with narrow gaps the rough one if it has the smaller standard deviation."""
-    if not np.isfinite(rough.sigma) or not measurer.narrow(rough.radius):
-        return close
-    sigma = float(np.hypot(rough.sigma, ROUGH_SIGMA))
-    return close if close.sigma < sigma else replace(rough, sigma=sigma)
+def _close(circles: Array, shift: float, radius_sd: float) -> Array:
+    """Rough circles (c, 5) for `CircleMeasurer.measure_closely`."""
+    return np.column_stack([circles[:, :3], np.full(len(circles), shift), np.full(len(circles), radius_sd)])
+
+
+def _better(measurer: CircleMeasurer, rough: Array, close: Array) -> Array:
+    """The close measurements (c, 5), or with narrow gaps the rough one if it has the smaller standard deviation."""
+    sigma = np.hypot(rough[:, 3], ROUGH_SIGMA)
+    narrow = np.array([measurer.narrow(each) for each in rough[:, 2].tolist()], dtype=np.bool_)
+    rougher = np.isfinite(rough[:, 3]) & narrow & ~(close[:, 3] < sigma)
+    return np.where(rougher[:, None], np.column_stack([rough[:, :3], sigma, rough[:, 4]]), close)
 
 
 def _judge_discs(
@@ -349,24 +343,6 @@ def _window(radius: float, known: bool) -> float:
     """Half width of the search for edges around a rough circle [px]: narrower for small grains, beside neighbours."""
     window = min(RING_UNCERTAINTY, max(SMALL_FRACTION * radius, 0.5 * RING_UNCERTAINTY))
     return window if known else max(window, 0.6 * (SCAN_STEP - 1.0) * radius)
-
-
-def _measure_each(count: int, one: Callable[[int], MeasuredCircle]) -> list[MeasuredCircle]:
-    """Measure each grain, on all cores."""
-    parts = np.array_split(np.arange(count), max(min(available_cores(), count // CIRCLES_PER_THREAD), 1))
-
-    def some(part: NDArray[np.intp]) -> list[MeasuredCircle]:
-        return [one(k) for k in part.tolist()]
-
-    found = parallel_map([partial(some, part) for part in parts], None)
-    return [each for part in found for each in part]
-
-
-def _detection(measured: list[MeasuredCircle], radius: Array) -> Detection:
-    def column(name: str) -> Array:
-        return np.array([getattr(one, name) for one in measured], dtype=np.float64)
-
-    return Detection(column("x"), column("y"), radius, column("sigma"), column("quality"))
 
 
 def _default_range(image: Image) -> tuple[float, float]:

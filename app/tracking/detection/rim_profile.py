@@ -75,13 +75,21 @@ def locate_edges(
     -----
     I(r) = B + A Φ(t) + C s (t Φ(t) + φ(t)), t = (r₀ − r)/s; fitted are r₀, A and C.
     """
-    count, (first, step) = len(start), distances
+    fitted, dark = fit_rim(rays, *distances, start, angle, width, extent, rounds)
+    return fitted[:, 0], fitted[:, 1], fitted[:, 3], dark
+
+
+@njit(cache=True, nogil=True)
+def fit_rim(rays, first, step, start, angle, width, extent, rounds):
+    """Return edge, level, slope over level, misfit (p, 4) and dark (p,), see `locate_edges`."""
+    count = len(start)
     dark, end = np.empty(count), np.empty(count)
     _find_darks(rays, first, step, start, max(DARK, DARK_WIDTHS * extent), dark, end)
     inside, outside = max(INSIDE, INSIDE_WIDTHS * extent), max(OUTSIDE, OUTSIDE_WIDTHS * extent)
-    fitted = np.empty((count, 4))
-    harmonics = np.stack([np.ones(count), np.cos(angle), np.sin(angle)], axis=1)
-    expected = np.zeros(count)
+    fitted, expected = np.empty((count, 4)), np.zeros(count)
+    harmonics = np.ones((count, 3))
+    for p in range(count):
+        harmonics[p, 1], harmonics[p, 2] = np.cos(angle[p]), np.sin(angle[p])
     for k in range(rounds):
         # The first round has no estimate of the shading, so its prior is wider.
         scatter = 3.0 * PAINT_SLOPE if k == 0 else PAINT_SLOPE
@@ -89,9 +97,10 @@ def locate_edges(
         good = np.isfinite(fitted[:, 0])
         if k == rounds - 1 or good.sum() < 12:
             break
-        slope = fitted[good, 2]
-        expected = harmonics @ _robust_regression(harmonics[good], slope, fitted[good, 1])
-    return fitted[:, 0], fitted[:, 1], fitted[:, 3], dark
+        shading = _robust_regression(harmonics[good], fitted[:, 2][good], fitted[:, 1][good])
+        for p in range(count):
+            expected[p] = harmonics[p, 0] * shading[0] + harmonics[p, 1] * shading[1] + harmonics[p, 2] * shading[2]
+    return fitted, dark
 
 
 @njit(cache=True, nogil=True)
