@@ -138,7 +138,7 @@ def test_results_outside_the_predicted_interval_are_marked():
 @pytest.mark.parametrize(
     ("scenario", "named", "rightly"),
     [("mu_01", "friction", True), ("mu_01", "walls_shifted", False), ("sheared", "friction", False),
-     ("sheared", None, None), ("cohesion", "not_explained", None), ("wrong_class", "not_explained", True)],
+     ("sheared", None, None), ("cohesion", "not_explained", None), ("wrong_class", "exchanged_sizes", True)],
 )  # fmt: skip
 def test_a_diagnosis_is_right_only_with_the_true_cause(scenario, named, rightly):
     diagnosis = () if named is None else (finding(named, "evidence"),)
