@@ -11,7 +11,7 @@ from ...solver.bodies.grains import Grains
 from ...solver.bodies.interpolation import interpolate_ignored_frames
 from ...solver.bodies.rods import RodMaterial
 from ...solver.boundary.boundary_correction import Boundary, BoundarySettings, correct_boundary
-from ...solver.boundary.camera_distortion import CameraDistortion, find_camera_distortion
+from ...solver.boundary.camera_distortion import ANISOTROPY, CameraDistortion, find_camera_distortion
 from ...solver.boundary.size_classes import group_readings
 from ...solver.boundary.walls_in_picture import correct_walls_in_picture
 from ...solver.detection.precision import contradiction, describe_contradiction, measure_precision
@@ -20,6 +20,10 @@ from ...solver.posterior.sequence_evidence import gather_position_evidence
 from ...tracks import Tracks, WallTracks
 from ..snapshots import make_snapshots, measure_sequence
 from .calibration import radius_classes
+
+# Of the relative overlap of soft grains: a lesser stretching is no error of the picture, because larger forces along
+# the direction of the greatest stress make larger overlaps along it.
+ANISOTROPIC = 0.5
 
 
 def measure_noise(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, str]:
@@ -86,8 +90,12 @@ def correct_camera(
         if not found.applied:  # calibration finds a lesser distortion with the walls
             return tracks, walls, "", None
         # Touching surfaces of hard grains meet by other distances, or by other radii if read in the same picture.
-        undistorted = replace(tracks, position=found.correct(tracks.position))
-        soft = soft or (material.stiffness is None and _overlap_softly(material, undistorted, walls, failed))
+        if material.stiffness is None:
+            undistorted = replace(tracks, position=found.correct(tracks.position))
+            overlap = _soft_overlap(material, undistorted, walls, failed)
+            if _stretching(found) < ANISOTROPIC * overlap / (2.0 * float(tracks.radius.mean())):
+                return tracks, walls, "", None
+            soft = overlap > 0.0
         scale = 1.0 if soft else found.common_scale()
         distance, radius = (scale, tracks.radius) if radii_known else (1.0, tracks.radius / scale)
         corrected = found.correct_scaled(position, distance)
@@ -117,10 +125,16 @@ def correct_camera(
     )  # fmt: skip
 
 
-def _overlap_softly(material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]) -> bool:
-    """Whether the overlaps vary as those of soft grains, so that they are forces and no error of the scale."""
+def _stretching(found: CameraDistortion) -> float:
+    """Stretching along one direction, with an equal shortening across it; infinite if there is more than that."""
+    more = found.value[ANISOTROPY.stop :].any()
+    return float("inf") if more else float(np.hypot(*found.value[ANISOTROPY]))
+
+
+def _soft_overlap(material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]) -> float:
+    """Mean overlap [m] if overlaps vary as those of soft grains, so that they are forces and no error of the scale."""
     packing = material.pack(tracks.radius, walls.usual_pressure(material.length), boundary=tracks.boundary)
-    return find_soft_overlap(packing, interpolate_ignored_frames(make_snapshots(tracks, walls), failed)) > 0.0
+    return find_soft_overlap(packing, interpolate_ignored_frames(make_snapshots(tracks, walls), failed))
 
 
 def _noise_of_gaps(material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]) -> float:
