@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from rodsight.tracking.detection.edges import centre_variance, find_steepest, fit_circle
+from rodsight.tracking.detection.edges import centre_variance, find_steepest
 from rodsight.tracking.detection.rim_profile import locate_edges
 from rodsight.tracking.detection.rings import without_overlap
 from scipy.optimize import least_squares
 
+from tests.reference.twins.circles import fitted_circle
 from tests.reference.twins.edges import apart, circle_step, rim, rim_misfit, sandwich_variance, steepest
 
 pytestmark = pytest.mark.unit
@@ -30,7 +31,7 @@ def edge_points(seed=3):
 @pytest.mark.parametrize("scatter", [np.inf, 0.05])
 def test_a_fitted_circle_is_a_fixed_point_of_the_plain_step(scatter):
     angle, distance, weight, (ex, ey, radius) = edge_points()
-    found = fit_circle((0.0, 0.0, 24.3), angle, distance, weight, radius_sd=scatter, min_scale=0.02)
+    found = fitted_circle((0.0, 0.0, 24.3), angle, distance, weight, radius_sd=scatter, min_scale=0.02)
     shift = np.array([found.x, found.y, found.radius - 24.3])
     step, residual, weights = circle_step(angle, distance, weight, 24.3, shift, scatter, 0.02)
     assert np.abs(step).max() < CONVERGED

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from ..short_sort import ascending_order
-from .edges import DENSITY, MARGIN, centre_variance, fit_points, trace, weighted_median
+from .edges import DENSITY, MARGIN, fit_circle, trace
 from .rim_profile import fit_rim
 
 # Least slope of an edge per pixel, as a fraction of the local contrast, and the slope from which its weight is full.
@@ -55,33 +55,23 @@ def measure_circles(coefficients, dark, contrast, rough, rules, out):
     """
     for c in range(len(rough)):
         x, y, radius, window, shift, radius_sd = rough[c]
-        excess, narrow, fraction, fewest, enough, min_view = rules[c]
         out[c, 0], out[c, 1], out[c, 2], out[c, 3], out[c, 4] = x, y, radius, np.nan, 0.0
         wanted = radius + shift
-        angle, _, edges, in_view = trace(coefficients, x, y, wanted, window, narrow != 0.0)
-        seen = np.zeros(len(angle), np.bool_)
-        local = see_edges(edges, dark, contrast, x, y, excess, seen)
-        count, viewed = seen.sum(), in_view.sum()
-        least = max(min(enough, np.rint(fraction * len(angle))), fewest)
-        if count < least or viewed / len(angle) < min_view:
-            continue
-        at, distance = angle[seen], edges[:, 0][seen]
-        weight = edges[:, 1][seen].astype(np.float32) / np.float32(SURE_SLOPE * local)
-        weight = np.minimum(weight, np.float32(1.0)) ** 2
-        start = weighted_median(distance - wanted, weight) if np.isinf(radius_sd) else 0.0
-        residual, w = np.empty_like(distance), np.empty_like(distance)
-        moved, scale, inverse, score = fit_points(
-            at, distance, weight.astype(np.float64), wanted, start, radius_sd, MIN_SCALE, residual, w
+        least, viewed, angle, _, edges, seen, local = rim_edges(
+            coefficients, dark, contrast, (x, y, wanted), window, rules[c]
         )
+        if seen.sum() < least:
+            continue
+        at, distance, weight = steepest_points(angle, edges, seen, local)
+        moved, sigma, residual = fit_circle(at, distance, weight, wanted, radius_sd, MIN_SCALE)
         there = x + moved[0], y + moved[1], wanted + moved[2]
         if not np.hypot(there[0] - x, there[1] - y) + abs(there[2] - radius - shift) < MAX_SHIFT_RATIO * window:
             continue
         on = np.abs(residual) < ON_CIRCLE
         if radius <= SMALL and _one_sidedness(at[on]) > ONE_SIDED:
             continue
-        variance = centre_variance(at, wanted, w, score, inverse, scale, radius_sd)
         out[c, 0], out[c, 1], out[c, 2] = there[0], there[1], there[2] - shift
-        out[c, 3] = np.sqrt(variance) if variance >= 0.0 else np.inf
+        out[c, 3] = sigma
         out[c, 4] = on.sum() / viewed
 
 
@@ -103,24 +93,15 @@ def measure_closely(coefficients, dark, contrast, rough, rules, width, out):
     """
     for c in range(len(rough)):
         x, y, radius, shift, radius_sd = rough[c]
-        excess, narrow, fraction, fewest, enough, min_view = rules[c]
         out[c, 0], out[c, 1], out[c, 2], out[c, 3], out[c, 4] = x, y, radius, np.nan, 0.0
         wanted = radius + shift
-        angle, rays, edges, in_view = trace(coefficients, x, y, wanted, CLOSE_WINDOW, narrow != 0.0)
-        seen = np.zeros(len(angle), np.bool_)
-        local = see_edges(edges, dark, contrast, x, y, excess, seen)
-        viewed = in_view.sum()
-        least = max(min(enough, np.rint(fraction * len(angle))), fewest)
-        if seen.sum() < least or viewed / len(angle) < min_view:
+        least, viewed, angle, rays, edges, seen, local = rim_edges(
+            coefficients, dark, contrast, (x, y, wanted), CLOSE_WINDOW, rules[c]
+        )
+        if seen.sum() < least:
             continue
-        at, distance = angle[seen], edges[:, 0][seen]
-        weight = edges[:, 1][seen].astype(np.float32) / np.float32(SURE_SLOPE * local)
-        weight = np.minimum(weight, np.float32(1.0)) ** 2
-        residual, w = np.empty_like(distance), np.empty_like(distance)
-        steepest, _, _, _ = fit_points(
-            at, distance, weight.astype(np.float64), wanted, weighted_median(distance - wanted, weight), np.inf,
-            MIN_SCALE, residual, w,
-        )  # fmt: skip
+        at, distance, weight = steepest_points(angle, edges, seen, local)
+        steepest, _, _ = fit_circle(at, distance, weight, wanted, np.inf, MIN_SCALE)
         for p in range(len(angle)):
             if not seen[p]:
                 edges[p, 0] = np.nan
@@ -132,20 +113,52 @@ def measure_closely(coefficients, dark, contrast, rough, rules, width, out):
         at, distance, level, darks = angle[good], fitted[:, 0][good], fitted[:, 1][good], darks[good]
         above, strength = lowest_tenth(darks), np.empty_like(distance)
         for p in range(len(at)):
-            clear = 1.0 - (darks[p] - above) / (excess * local)
+            clear = 1.0 - (darks[p] - above) / (rules[c, 0] * local)
             clear = min(max(clear, LEAST_WEIGHT), 1.0)
             strength[p] = (min(level[p] / (SURE_LEVEL * local), 1.0) * clear) ** 2
-        start = weighted_median(distance - wanted, strength) if np.isinf(radius_sd) else 0.0
-        residual, w = np.empty_like(distance), np.empty_like(distance)
-        moved, scale, inverse, score = fit_points(
-            at, distance, strength, wanted, start, radius_sd, MIN_SCALE_CLOSE, residual, w
-        )
-        variance = centre_variance(at, wanted, w, score, inverse, scale, radius_sd)
-        sigma = np.sqrt(variance) if variance >= 0.0 else np.inf
+        moved, sigma, residual = fit_circle(at, distance, strength, wanted, radius_sd, MIN_SCALE_CLOSE)
         shaded = np.hypot(x + moved[0] - (x + steepest[0]), y + moved[1] - (y + steepest[1])) / np.sqrt(2.0)
         out[c, 0], out[c, 1], out[c, 2] = x + moved[0], y + moved[1], wanted + moved[2] - shift
         out[c, 3] = np.hypot(sigma, SHADING_LEFT * shaded)
         out[c, 4] = (np.abs(residual) < ON_CIRCLE).sum() / viewed
+
+
+@njit(cache=True, nogil=True)
+def rim_edges(coefficients, dark, contrast, circle, window, rule):
+    """Trace the edges about a circle.
+
+    Parameters
+    ----------
+    coefficients, dark, contrast : array
+        As in `measure_circles`.
+    circle : tuple of float
+        x, y, radius of the edges [px].
+    window : float
+        Half width of the search [px].
+    rule : (6,) array
+        A row of the rules of `measure_circles`.
+
+    Returns
+    -------
+    tuple
+        Number of rays that must meet an edge, infinite where too few are in view; number of rays in view; angle (p,),
+        rays (p, s) and edges (p, 3) as from `trace`; which rays meet an edge (p,); local contrast [grey].
+    """
+    x, y, radius = circle
+    excess, narrow, fraction, fewest, enough, min_view = rule
+    angle, rays, edges, in_view = trace(coefficients, x, y, radius, window, narrow != 0.0)
+    seen = np.zeros(len(angle), np.bool_)
+    local = see_edges(edges, dark, contrast, x, y, excess, seen)
+    viewed = in_view.sum()
+    least = max(min(enough, np.rint(fraction * len(angle))), fewest)
+    return least if viewed / len(angle) >= min_view else np.inf, viewed, angle, rays, edges, seen, local
+
+
+@njit(cache=True, nogil=True)
+def steepest_points(angle, edges, seen, local):
+    """Return angle, distance and weight (q,) of the steepest points that are seen."""
+    weight = edges[:, 1][seen].astype(np.float32) / np.float32(SURE_SLOPE * local)
+    return angle[seen], edges[:, 0][seen], np.minimum(weight, np.float32(1.0)) ** 2
 
 
 @njit(cache=True, nogil=True)

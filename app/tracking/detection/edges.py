@@ -135,40 +135,28 @@ def find_steepest(ray, first, radius, window, narrow, edges, in_view):
                 edges[p, 2] = min(edges[p, 2], ray[p, k])
 
 
-@dataclass(frozen=True, slots=True)
-class Circle:
-    """A circle through edge points."""
-
-    x: float  # [px]
-    y: float  # [px]
-    radius: float  # [px]
-    sigma: float  # [px] standard deviation of a component of the centre
-    residual: Array  # (p,) [px] of every point, positive outside the circle
-
-
-def fit_circle(
-    rough: tuple[float, float, float],
-    angle: Array,
-    distance: Array,
-    weight: Array,
-    *,
-    radius_sd: float,
-    min_scale: float,
-) -> Circle:
+@njit(cache=True, nogil=True)
+def fit_circle(angle, distance, weight, radius, radius_sd, min_scale):
     """Fit a circle through points with Tukey's weights.
 
     Parameters
     ----------
-    rough : tuple of float
-        Circle x, y, radius [px] to start from.
     angle, distance : (p,) array
-        Points about (x, y) [rad, px].
+        Points about the rough centre [rad, px].
     weight : (p,) array
         Weights of the points.
+    radius : float
+        Rough radius [px].
     radius_sd : float
         Standard deviation of the true radius about the given one [px]; infinite where it is unknown.
     min_scale : float
         Residuals below it are never outliers [px].
+
+    Returns
+    -------
+    tuple
+        Change of centre and radius (3,) [px]; standard deviation of a component of the centre [px]; residual (p,) of
+        every point [px], positive outside the circle.
 
     Notes
     -----
@@ -176,17 +164,15 @@ def fit_circle(
     (1 − (r / (4.685 s))²)², s: 1.4826 times the median of |r|. The centre's variance is the sandwich estimate
     H⁻¹ (Σ g gᵀ) H⁻¹ with the scores g summed over arcs of the outline, because one dot of paint affects several points.
     """
-    x, y, radius = rough
     # Start from the points' own radius: with a common shift they would all be outliers.
     start = weighted_median(distance - radius, weight) if np.isinf(radius_sd) else 0.0
     residual, w = np.empty_like(distance), np.empty_like(distance)
     shift, scale, inverse, score = fit_points(
-        angle, distance, np.asarray(weight, dtype=np.float64), radius, start, radius_sd, min_scale, residual, w
+        angle, distance, weight.astype(np.float64), radius, start, radius_sd, min_scale, residual, w
     )
     variance = centre_variance(angle, radius, w, score, inverse, scale, radius_sd)
     # With too few points for a circle the variance consists of rounding errors.
-    sigma = float(np.sqrt(variance)) if variance >= 0.0 else np.inf
-    return Circle(x + shift[0], y + shift[1], radius + shift[2], sigma, residual)
+    return shift, np.sqrt(variance) if variance >= 0.0 else np.inf, residual
 
 
 @njit(cache=True, nogil=True)

@@ -88,22 +88,21 @@ def without_overlap(x: Array, y: Array, radius: Array, *, allowed: float) -> np.
     """
     if len(x) == 0:
         return np.empty(0, np.intp)
-    x, y, radius = (np.ascontiguousarray(value, np.float64) for value in (x, y, radius))
+    circles = np.column_stack([x, y, radius]).astype(np.float64)
     alive = np.ones(len(x), dtype=np.bool_)
-    largest = float(radius.max())
-    columns, rows = (int((value.max() - value.min()) / largest) + 1 for value in (x, y))
-    strike_out(x, y, radius, allowed, largest, np.full((rows, columns), -1, np.intp), np.empty(len(x), np.intp), alive)
+    largest = float(circles[:, 2].max())
+    strike_out(circles, allowed, largest, _empty_grid(circles, largest), np.empty(len(x), np.intp), alive)
     return np.flatnonzero(alive)
 
 
 @njit(cache=True, nogil=True)
-def strike_out(x, y, radius, allowed, cell, head, following, alive):
+def strike_out(circles, allowed, cell, head, following, alive):
     """Clear alive (n,) where a circle overlaps an earlier one that is alive.
 
     Parameters
     ----------
-    x, y, radius : (n,) array
-        Circles [px].
+    circles : (n, 3) array
+        x, y, radius [px].
     allowed : float
         Greatest overlap, as a fraction of the smaller radius.
     cell : float
@@ -113,20 +112,14 @@ def strike_out(x, y, radius, allowed, cell, head, following, alive):
     alive : (n,) array
         True at first.
     """
-    rows, columns = head.shape
+    x, y, radius = circles[:, 0], circles[:, 1], circles[:, 2]
     left, top = x[0], y[0]
     for k in range(1, len(x)):
         left, top = min(left, x[k]), min(top, y[k])
     for k in range(len(x)):
         column, row = int((x[k] - left) / cell), int((y[k] - top) / cell)
-        for j in range(max(row - 2, 0), min(row + 3, rows)):
-            for i in range(max(column - 2, 0), min(column + 3, columns)):
-                other = head[j, i]
-                while other >= 0 and alive[k]:
-                    distance = np.sqrt((x[other] - x[k]) ** 2 + (y[other] - y[k]) ** 2)
-                    if distance < radius[k] + radius[other] - allowed * min(radius[k], radius[other]):
-                        alive[k] = False
-                    other = following[other]
+        squares = row - 2, row + 2, column - 2, column + 2
+        alive[k] = overlapping(x[k], y[k], radius[k], circles, allowed, head, following, squares) < 0
         if alive[k]:
             following[k] = head[row, column]
             head[row, column] = k
@@ -152,56 +145,68 @@ def not_overlapping(circles: Array, found: Array, overlapped: Array, *, allowed:
         return apart
     found = np.ascontiguousarray(found[:, :3], np.float64)
     cell = float(found[:, 2].max())
-    columns, rows = (int(np.ptp(found[:, axis]) / cell) + 1 for axis in (0, 1))
-    head = np.full((rows, columns), -1, np.intp)
-    strike_out_beside(circles, found, overlapped, allowed, head, np.empty(len(found), np.intp), apart)
+    head, following = _empty_grid(found, cell), np.empty(len(found), np.intp)
+    strike_out_beside(circles, found, overlapped, allowed, cell, head, following, apart)
     return apart
 
 
+def _empty_grid(circles: Array, cell: float) -> np.ndarray:
+    """Heads (rows, columns) of the lists of circles in the squares of a grid over all centres, whose side is `cell`."""
+    columns, rows = (int(np.ptp(circles[:, axis]) / cell) + 1 for axis in (0, 1))
+    return np.full((rows, columns), -1, np.intp)
+
+
 @njit(cache=True, nogil=True)
-def strike_out_beside(circles, found, overlapped, allowed, head, following, apart):
+def strike_out_beside(circles, found, overlapped, allowed, cell, head, following, apart):
     """Clear apart (n,) where a circle overlaps one of the found ones, see `not_overlapping`.
 
     head (rows, columns), −1 at first, and following (c,) are workspace: linked lists of the found circles in each
-    square of a grid, whose side is the greatest radius found.
+    square of a grid, whose side `cell` is the greatest radius found.
     """
-    rows, columns = head.shape
-    left, top, cell = found[0, 0], found[0, 1], found[0, 2]
+    left, top = found[0, 0], found[0, 1]
     for k in range(1, len(found)):
-        left, top, cell = min(left, found[k, 0]), min(top, found[k, 1]), max(cell, found[k, 2])
+        left, top = min(left, found[k, 0]), min(top, found[k, 1])
     for k in range(len(found)):
         column, row = int((found[k, 0] - left) / cell), int((found[k, 1] - top) / cell)
         following[k] = head[row, column]
         head[row, column] = k
     for k in range(len(circles)):
         x, y, radius = circles[k]
-        reach = radius + cell
-        # The square of the last one first, which may lie outside the grid by now.
-        for step in range(2):
-            if step == 0:
-                if np.isnan(overlapped[k, 0]):
-                    continue
-                column, row = np.floor((overlapped[k, 0] - left) / cell), np.floor((overlapped[k, 1] - top) / cell)
-                first, last, upper, lower = int(column), int(column), int(row), int(row)
-            else:
-                first, last = int(np.floor((x - reach - left) / cell)), int(np.floor((x + reach - left) / cell))
-                upper, lower = int(np.floor((y - reach - top) / cell)), int(np.floor((y + reach - top) / cell))
-            for j in range(max(upper, 0), min(lower + 1, rows)):
-                for i in range(max(first, 0), min(last + 1, columns)):
-                    other = head[j, i]
-                    while other >= 0 and apart[k]:
-                        size = found[other, 2]
-                        distance = np.sqrt((found[other, 0] - x) ** 2 + (found[other, 1] - y) ** 2)
-                        if distance < radius + size - allowed * min(radius, size):
-                            apart[k] = False
-                            overlapped[k] = found[other]
-                        other = following[other]
-                    if not apart[k]:
-                        break
-                if not apart[k]:
-                    break
-            if not apart[k]:
-                break
+        other = -1
+        if not np.isnan(overlapped[k, 0]):
+            # The square of the last one first, which may lie outside the grid by now.
+            row, column = (
+                int(np.floor((overlapped[k, 1] - top) / cell)),
+                int(np.floor((overlapped[k, 0] - left) / cell)),
+            )
+            other = overlapping(x, y, radius, found, allowed, head, following, (row, row, column, column))
+        if other < 0:
+            reach = radius + cell
+            squares = (
+                int(np.floor((y - reach - top) / cell)), int(np.floor((y + reach - top) / cell)),
+                int(np.floor((x - reach - left) / cell)), int(np.floor((x + reach - left) / cell)),
+            )  # fmt: skip
+            other = overlapping(x, y, radius, found, allowed, head, following, squares)
+        if other >= 0:
+            apart[k] = False
+            overlapped[k] = found[other]
+
+
+@njit(cache=True, nogil=True)
+def overlapping(x, y, radius, circles, allowed, head, following, squares):
+    """Return a listed circle that overlaps one at x, y, −1: none; squares: first and last row, column of the grid."""
+    rows, columns = head.shape
+    upper, lower, first, last = squares
+    for j in range(max(upper, 0), min(lower + 1, rows)):
+        for i in range(max(first, 0), min(last + 1, columns)):
+            other = head[j, i]
+            while other >= 0:
+                size = circles[other, 2]
+                distance = np.sqrt((circles[other, 0] - x) ** 2 + (circles[other, 1] - y) ** 2)
+                if distance < radius + size - allowed * min(radius, size):
+                    return other
+                other = following[other]
+    return -1
 
 
 def tile_size(radius: float) -> int:

@@ -2,10 +2,29 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from rodsight.experiment.pictures.image import Image
 from rodsight.solver.bodies.grains import Array
 from rodsight.tracking.detection.edges import fit_circle, trace_outline
+
+
+class FittedCircle(NamedTuple):
+    """A circle through edge points [px]."""
+
+    x: float
+    y: float
+    radius: float
+    sigma: float
+    residual: Array
+
+
+def fitted_circle(rough, angle, distance, weight, *, radius_sd, min_scale) -> FittedCircle:
+    """The compiled fit about a rough circle x, y, radius."""
+    x, y, radius = rough
+    shift, sigma, residual = fit_circle(angle, distance, weight, radius, radius_sd, min_scale)
+    return FittedCircle(x + shift[0], y + shift[1], radius + shift[2], sigma, residual)
 
 
 def measured(coefficients: Image, dark: Image, contrast: Image, rough: Array, rules: Array) -> list[float]:
@@ -25,7 +44,7 @@ def measured(coefficients: Image, dark: Image, contrast: Image, rough: Array, ru
         return none
     angle, distance = outline.angle[seen], outline.distance[seen]
     weight = np.minimum(outline.strength[seen] / (0.3 * local), 1.0) ** 2
-    circle = fit_circle((x, y, radius + shift), angle, distance, weight, radius_sd=scatter, min_scale=0.1)
+    circle = fitted_circle((x, y, radius + shift), angle, distance, weight, radius_sd=scatter, min_scale=0.1)
     moved = np.hypot(circle.x - x, circle.y - y) + abs(circle.radius - radius - shift)
     if not moved < 2.5 * window:
         return none
