@@ -220,21 +220,23 @@ def check_inside(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> N
     section = experiment.config.walls
     if section is None:
         return
-    depth = -bounding_distance(walls.endpoints[:, None], walls.sides, tracks.position)[0]
-    for w, name in enumerate(walls.name):
-        beyond = depth[..., w]
-        outside = np.argwhere(beyond > tracks.radius)  # NaN of lost grains compares false
-        if len(outside):
-            k, row = (int(v) for v in outside[0])
-            straight = walls.sides[w] == STRAIGHT
-            table = (section.file if straight else section.arcs) or section.corners
-            raise InputError(
-                experiment.folder / (table or ""),
-                f"frame {k}, wall {name!r}",
-                f"grain {tracks.id[row]} lies {float(beyond[k, row]) * 1e3:.4g} mm beyond it; "
-                f"the packing must lie {SIDE_OF_PACKING[int(walls.sides[w])]}, all in metres"
-                f"{_cause_of_walls(experiment, tracks, walls)}",
-            )
+    found: dict[int, tuple[int, int, float]] = {}  # of every wall the first frame and row, and how far beyond [m]
+    for k in range(tracks.frame_count):  # one by one: the distances from all walls in all frames take much memory
+        beyond = -bounding_distance(walls.endpoints[k], walls.sides, tracks.position[k])[0]
+        for row, w in np.argwhere(beyond > tracks.radius[:, None]).tolist():  # NaN of lost grains compares false
+            found.setdefault(w, (k, row, float(beyond[row, w])))
+    if not found:
+        return
+    w = min(found)
+    k, row, far = found[w]
+    table = (section.file if walls.sides[w] == STRAIGHT else section.arcs) or section.corners
+    raise InputError(
+        experiment.folder / (table or ""),
+        f"frame {k}, wall {walls.name[w]!r}",
+        f"grain {tracks.id[row]} lies {far * 1e3:.4g} mm beyond it; "
+        f"the packing must lie {SIDE_OF_PACKING[int(walls.sides[w])]}, all in metres"
+        f"{_cause_of_walls(experiment, tracks, walls)}",
+    )
 
 
 def _cause_of_walls(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> str:

@@ -124,15 +124,39 @@ def faces_walls(endpoints: Array, side: Sides, point: Array, margin: Array) -> N
         True beside a wall. Past its end within the margin it is True unless the grain is beside another wall that faces
         the same way, as in a box that is split.
     """
-    walls, place, shape = endpoints[None], point[:, None], None if side is None else side[None]
-    beside = beside_wall(walls, shape, place, np.zeros((len(point), 1)))
-    near = beside_wall(walls, shape, place, margin[:, None])
-    straight = all_sides(side, len(endpoints)) == STRAIGHT
-    outward = np.where(straight[:, None], outward_normals(endpoints), 0.0)
-    alike = (outward @ outward.T > ALIKE) & ~np.eye(len(endpoints), dtype=bool)
-    if not alike.any():
+    near = beside_wall(endpoints[None], None if side is None else side[None], point[:, None], margin[:, None])
+    another = beside_another(endpoints, side, point)
+    if another is None:
         return near
-    return beside | (near & ~(beside.astype(np.float64) @ alike > 0.0))
+    beside = beside_wall(endpoints[None], None if side is None else side[None], point[:, None], np.zeros(1))
+    return beside | (near & ~another)
+
+
+def beside_another(endpoints: Array, side: Sides, point: Array) -> NDArray[np.bool_] | None:
+    """Return which grains are beside another straight wall that faces the same way.
+
+    Parameters
+    ----------
+    endpoints : (…, w, 2, 2)
+        Walls [m].
+    side : (w,)
+        Shapes of the walls.
+    point : (…, n, 2)
+        Centres [m].
+
+    Returns
+    -------
+    (…, n, w), or None
+        Beside another wall than w that faces as w does; None: no two walls face the same way.
+    """
+    straight = all_sides(side, endpoints.shape[-3]) == STRAIGHT
+    outward = np.where(straight[:, None], outward_normals(endpoints), 0.0)
+    alike = np.einsum("...wk,...vk->...wv", outward, outward) > ALIKE
+    alike &= ~np.eye(len(straight), dtype=bool)
+    if not alike.any():
+        return None
+    beside = beside_wall(endpoints[..., None, :, :, :], None, point[..., None, :], np.zeros(1))
+    return (beside & straight).astype(np.float64) @ alike.astype(np.float64) > 0.0
 
 
 def bounding_distance(endpoints: Array, side: Sides, point: Array) -> tuple[Array, Array]:

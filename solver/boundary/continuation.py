@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bodies.grains import Array
-from ..bodies.wall_shapes import ALIKE, STRAIGHT, all_sides, beside_wall, outward_normals
+from ..bodies.wall_shapes import STRAIGHT, all_sides, beside_another, outward_normals
 from ..calibration.gaps import MeasuredSequence
 
 CONTACT_DISTANCE = 0.05  # radii: greatest distance of a rod's surface from the line of a wall that it bears on
@@ -63,12 +63,12 @@ def _past_ends(sequence: MeasuredSequence) -> Iterator[_PastEnd]:
     normal = outward_normals(ends)
     along = _along(normal)
     length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
-    beside_another = _beside_another(sequence, normal)
+    another = beside_another(ends, sequence.side, sequence.position)
     for w in _straight(sequence).tolist():
         offset = sequence.position - ends[:, None, w, 0]
         place = np.einsum("fnk,fk->fn", offset, along[:, w])
         depth = -np.einsum("fnk,fk->fn", offset, normal[:, w])
-        free = sequence.present & ~beside_another[..., w]
+        free = sequence.present if another is None else sequence.present & ~another[..., w]
         for end, past in enumerate((-place, place - length[:, None, w])):
             with np.errstate(invalid="ignore"):
                 off = np.abs(depth - radius)
@@ -86,15 +86,6 @@ def _straight(sequence: MeasuredSequence) -> NDArray[np.intp]:
 
 def _along(normal: Array) -> Array:
     return np.stack([-normal[..., 1], normal[..., 0]], axis=-1)
-
-
-def _beside_another(sequence: MeasuredSequence, normal: Array) -> NDArray[np.bool_]:
-    """Which grains (f, n, w) are beside another straight wall that faces the same way as wall w."""
-    side = all_sides(sequence.side, sequence.wall_count)
-    beside = beside_wall(sequence.endpoints[:, None], None, sequence.position[:, :, None], np.zeros(1))
-    beside &= side == STRAIGHT
-    alike = (np.einsum("fwk,fvk->fwv", normal, normal) > ALIKE) & ~np.eye(sequence.wall_count, dtype=bool)
-    return np.einsum("fnv,fwv->fnw", beside.astype(np.float64), alike.astype(np.float64)) > 0.0
 
 
 def extend_walls(endpoints: Array, extension: Array) -> Array:
