@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from ..solver.bodies.grains import Array
+from ..solver.bodies.interpolation import interpolate_ignored_frames
 from ..solver.bodies.motion import Snapshot
+from ..solver.bodies.packing import Packing
+from ..solver.bodies.rods import RodMaterial
 from ..solver.calibration.gaps import MeasuredSequence
 from ..solver.inferred.unknown_rotations import fill_unknown_rotations
 from ..tracks import Tracks, WallTracks
@@ -27,6 +32,14 @@ def make_snapshots(tracks: Tracks, walls: WallTracks) -> list[Snapshot]:
         )
         for k in range(tracks.frame_count)
     ]  # fmt: skip
+
+
+def pack_seen(
+    material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]
+) -> tuple[Packing, list[Snapshot]]:
+    """The packing and its snapshots, those of unusable photographs interpolated."""
+    packing = material.pack(tracks.radius, walls.usual_pressure(material.length), boundary=tracks.boundary)
+    return packing, interpolate_ignored_frames(make_snapshots(tracks, walls), failed)
 
 
 def measure_sequence(tracks: Tracks, walls: WallTracks) -> MeasuredSequence:

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from ...solver.bodies.grains import Grains
-from ...solver.bodies.interpolation import interpolate_ignored_frames
 from ...solver.bodies.rods import RodMaterial
 from ...solver.boundary.boundary_correction import Boundary, BoundarySettings, correct_boundary
 from ...solver.boundary.camera_distortion import ANISOTROPY, CameraDistortion, find_camera_distortion
@@ -18,7 +17,7 @@ from ...solver.detection.precision import contradiction, describe_contradiction,
 from ...solver.mixture.soft_grains import find_soft_overlap
 from ...solver.posterior.sequence_evidence import gather_position_evidence
 from ...tracks import Tracks, WallTracks
-from ..snapshots import make_snapshots, measure_sequence
+from ..snapshots import make_snapshots, measure_sequence, pack_seen
 from .calibration import radius_classes
 
 # Of the relative overlap of soft grains: a lesser stretching is no error of the picture, because larger forces along
@@ -92,10 +91,10 @@ def correct_camera(
         # Touching surfaces of hard grains meet by other distances, or by other radii if read in the same picture.
         if material.stiffness is None:
             undistorted = replace(tracks, position=found.correct(tracks.position))
-            overlap = _soft_overlap(material, undistorted, walls, failed)
+            overlap = find_soft_overlap(*pack_seen(material, undistorted, walls, failed))
             if _stretching(found) < ANISOTROPIC * overlap / (2.0 * float(tracks.radius.mean())):
                 return tracks, walls, "", None
-            soft = overlap > 0.0
+            soft = overlap > 0.0  # overlaps are forces then, and no error of the scale
         scale = 1.0 if soft else found.common_scale()
         distance, radius = (scale, tracks.radius) if radii_known else (1.0, tracks.radius / scale)
         corrected = found.correct_scaled(position, distance)
@@ -131,18 +130,10 @@ def _stretching(found: CameraDistortion) -> float:
     return float("inf") if more else float(np.hypot(*found.value[ANISOTROPY]))
 
 
-def _soft_overlap(material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]) -> float:
-    """Mean overlap [m] if overlaps vary as those of soft grains, so that they are forces and no error of the scale."""
-    packing = material.pack(tracks.radius, walls.usual_pressure(material.length), boundary=tracks.boundary)
-    return find_soft_overlap(packing, interpolate_ignored_frames(make_snapshots(tracks, walls), failed))
-
-
 def _noise_of_gaps(material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]) -> float:
     """Standard deviation of a position component [m] by the changes of gaps; the stated one without near grains."""
-    packing = material.pack(tracks.radius, walls.usual_pressure(material.length), boundary=tracks.boundary)
     try:
-        seen = interpolate_ignored_frames(make_snapshots(tracks, walls), failed)
-        return gather_position_evidence(packing, seen).noise.sigma
+        return gather_position_evidence(*pack_seen(material, tracks, walls, failed)).noise.sigma
     except ValueError:  # no two bodies are near
         return _stated_noise(tracks)
 

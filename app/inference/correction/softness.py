@@ -6,7 +6,6 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from ...solver.assessment.mixture_trust import MAX_TRUST_MEASURED, MAX_TRUST_STATED
-from ...solver.bodies.interpolation import interpolate_ignored_frames
 from ...solver.bodies.packing import Packing
 from ...solver.bodies.rods import RodMaterial
 from ...solver.mixture.soft_grains import find_soft_overlap
@@ -15,7 +14,7 @@ from ...solver.posterior.posterior_settings import PosteriorSettings
 from ...solver.posterior.sequence_evidence import gather_position_evidence
 from ...solver.sequence.settings import SequenceSettings
 from ...tracks import Tracks, WallTracks
-from ..snapshots import make_snapshots
+from ..snapshots import pack_seen
 from .radii import find_wrong_sizes
 
 STIFFNESS_SD = 0.2  # relative standard deviation of a given stiffness
@@ -44,9 +43,8 @@ def assume_softness(
     given = material.stiffness is not None or walls.count > 0 or walls.cell is not None
     if given or tracks.grain_count == 0 or len(failed) == tracks.frame_count:
         return material, ""
-    packing = material.pack(tracks.radius, walls.usual_pressure(material.length), boundary=tracks.boundary)
     try:
-        evidence = gather_position_evidence(packing, interpolate_ignored_frames(make_snapshots(tracks, walls), failed))
+        evidence = gather_position_evidence(*pack_seen(material, tracks, walls, failed))
     except ValueError:  # no two bodies are near
         return material, ""
     noise = evidence.noise.sigma / (2.0 * float(tracks.radius.mean()))
@@ -65,9 +63,8 @@ def find_softness(
     """Adapt the settings to soft grains, as specified or as their gaps show; unchanged for hard grains."""
     if settings.positions == "never" or material.stiffness == "rigid":
         return settings
-    pressure = walls.usual_pressure(material.length)
-    packing = material.pack(tracks.radius, pressure, boundary=tracks.boundary)
-    seen = find_soft_overlap(packing, interpolate_ignored_frames(make_snapshots(tracks, walls), failed))
+    packing, snapshots = pack_seen(material, tracks, walls, failed)
+    seen = find_soft_overlap(packing, snapshots)
     # A given stiffness, or the request to estimate it, means soft grains even where too small radii hide the overlaps.
     if material.stiffness is None and (not seen or find_wrong_sizes(tracks, walls, failed)):
         return settings
