@@ -98,3 +98,13 @@ def test_positions_weigh_more_where_forces_correct_the_motion_and_overlaps_are_c
     assert weight(0.1, 0.9, 0.5) > middle > weight(0.1, 0.9, 0.05)
     assert weight(9.0, 0.9, 9.0) == weight(2.0, 0.9, 1.5)  # the range of the fit
     assert weight(math.nan, math.nan, math.nan) == weight(0.1, 0.5, 0.1)
+
+
+def test_positions_weigh_more_where_members_disagree_and_the_motion_is_farther_from_the_overlaps():
+    given = replace(SOUND, correction=0.1, position_agreement=0.9, overlap_agreement=0.7, power_gap=0.2)
+    weight = evident_position_weight(given)
+    assert evident_position_weight(replace(given, overlap_agreement=0.95)) < weight
+    assert evident_position_weight(replace(given, overlap_agreement=0.4)) > weight
+    assert evident_position_weight(replace(given, disagreement=2.0 * given.disagreement)) > weight
+    unknown, equal = (replace(given, overlap_agreement=each) for each in (math.nan, 0.9))
+    assert evident_position_weight(unknown) == evident_position_weight(equal)

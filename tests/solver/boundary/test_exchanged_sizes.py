@@ -59,9 +59,30 @@ def test_overlaps_of_soft_grains_show_no_size(packing) -> None:
     middle = position.mean(axis=1, keepdims=True)
     soft = middle + 0.97 * (position - middle)
     assert np.array_equal(find_exchanged_sizes(soft, stated, classes), stated)
+    less, right = middle + 0.98 * (position - middle), np.unique(radius, return_inverse=True)[1]
+    assert np.array_equal(find_exchanged_sizes(less, radius, right), radius)
 
 
 def test_nothing_is_exchanged_where_most_would_be(packing) -> None:
     position, radius, _ = packing
     stated, classes = exchanged(radius, list(range(0, len(radius), 2)), 1)
     assert np.array_equal(find_exchanged_sizes(position, stated, classes), stated)
+
+
+def test_neighbours_of_an_exchanged_grain_keep_their_sizes(packing) -> None:
+    position, radius, _ = packing
+    stated, classes = exchanged(radius, [40, 13, 47, 15, 41, 6], 1)
+    assert np.array_equal(find_exchanged_sizes(position, stated, classes), radius)
+
+
+@pytest.mark.parametrize(("neighbours", "grows"), [(2, False), (3, True)])
+def test_a_loose_grain_in_a_hole_of_another_size_is_greater_only_if_it_touches_three(neighbours, grows) -> None:
+    small, large = 0.007, 0.011
+    angle = 2.0 * np.pi * np.arange(neighbours) / neighbours
+    around = 2.0 * large * np.column_stack([np.cos(angle), np.sin(angle)])
+    elsewhere = np.column_stack([np.linspace(0.2, 0.5, 4), np.zeros(4)])
+    position = np.concatenate([[[0.0, 0.0]], around, elsewhere])[None]
+    radius = np.append(small, np.full(neighbours + 4, large))
+    found = find_exchanged_sizes(position, radius, np.append(0, np.ones(neighbours + 4, np.int64)))
+    assert (found[0] == large) == grows
+    assert (found[1:] == large).all()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from rodsight.solver.bodies.grains import Array
+from rodsight.solver.inferred.surroundings import Surroundings
 from rodsight.solver.inferred.unseen_rods import UnseenRods, UnseenRodSettings, infer_unseen
 
 from tests.golden.forces import NOISE, STORED
@@ -95,3 +96,11 @@ def test_hole_that_other_rods_enter_holds_no_rod() -> None:
     assert held.count == 1
     assert held.position == pytest.approx(0.0, abs=1e-6)
     assert ring(closing=0.1).count == 0
+
+
+def test_only_walls_that_bound_a_place_are_around_it() -> None:
+    halves = np.array([[[[0.2, 0.0], [0.2, 0.1]], [[0.205, 0.1], [0.205, 0.2]]]])
+    rod = np.array([[[0.05, 0.05]]])
+    around = Surroundings(np.array([0.01]), rod, np.ones((1, 1), bool), halves, NOISE)
+    assert around.gaps(np.array([0.203, 0.15]), 0, 0.01) == pytest.approx([-0.008], abs=1e-6)  # in the shifted half
+    assert around.gaps(np.array([0.19, 0.15]), 0, 0.01) == pytest.approx([0.0, 0.005], abs=1e-6)

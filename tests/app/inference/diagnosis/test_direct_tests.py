@@ -112,6 +112,20 @@ def test_a_wall_that_rods_penetrate_while_it_rests_is_named():
     assert examine_walls(moved, replace(walls, endpoints=endpoints)) == []
 
 
+def test_rods_in_the_half_of_a_box_that_slides_do_not_penetrate_the_other_half():
+    tracks = rolling_tracks()
+    side = SIDE * PITCH
+    halves = np.array([[[side, 0.0], [side, 0.5 * side]], [[side, 0.5 * side], [side, side]]])
+    endpoints = np.repeat(halves[None], FRAMES, axis=0)
+    slide = np.linspace(0.0, 5e-3, FRAMES)
+    endpoints[:, 1, :, 0] += slide[:, None]
+    x, y = (each.ravel() * PITCH + RADIUS for each in np.meshgrid(np.arange(SIDE), np.arange(SIDE)))
+    place = np.broadcast_to(np.stack([x, y], axis=-1), (FRAMES, N, 2)).copy()
+    place[..., 0] += slide[:, None] * (y > 0.5 * side)
+    split = WallTracks(("low", "high"), endpoints, np.full(2, np.nan))
+    assert examine_walls(replace(tracks, position=place), split) == []
+
+
 def test_photographs_in_random_order_are_named():
     tracks = rolling_tracks()
     order = np.array([3, 0, 6, 2, 7, 1, 5, 4])
