@@ -146,6 +146,10 @@ class Tracks:
         """Whether a grain has a pose (f, n)."""
         return np.isfinite(self.position[..., 0]) & np.isfinite(self.position[..., 1])
 
+    def present_in(self, k: int) -> NDArray[np.bool_]:
+        """Whether a grain has a pose in frame k (n,)."""
+        return np.isfinite(self.position[k]).all(axis=1)
+
     @property
     def lost(self) -> NDArray[np.bool_]:
         """Whether a visible grain was not found (f, n), interpolated or not; inferred grains are not counted."""

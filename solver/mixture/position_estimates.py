@@ -18,6 +18,7 @@ from ..posterior.posterior_settings import PosteriorSettings
 from ..posterior.sequence_evidence import SequenceEvidence, gather_position_evidence
 from .fringe_evidence import calibrate_sequence_fringes
 
+STEADY_LOAD = 0.1  # relative change of a load, beyond which photographs share no estimate
 SEED = 0  # of the draws, with the number of the frame: the same bits for any order of requests
 
 
@@ -47,23 +48,28 @@ class PositionEstimates:
         given : mapping of int to FramePosterior, optional
             Posteriors of some frames, used as they are.
         alike : int
-            Photographs so close together that they share one posterior, that of the first of every so many.
+            Photographs so close together that they share one posterior, that of the first of every so many; where a
+            measured load changes by more than a tenth, the next ones begin.
         """
         self._workers = workers
         self._packing, self._snapshots, self._settings = packing, snapshots, settings
         self._evidence: SequenceEvidence | None = None
-        self._alike = alike
+        self._shared = _shared_frames(snapshots, alike)
         self._fringes: FringeCalibration | None = None
         self._known: dict[int, FramePosterior | None] = dict(given or {})
 
     def at(self, k: int, verdicts: Verdicts = NO_VERDICTS) -> FramePosterior | None:
         """Return the posterior of frame k with its reviewed pairs; None where no two bodies are near."""
-        if verdicts is NO_VERDICTS and k not in self._known:
-            k -= k % self._alike  # whatever was requested before: an interrupted run goes on with the same bits
+        if k not in self._known:
+            k = self.frame_of(k, verdicts)
         if k not in self._known:
             # Only the last one is kept: a frame is requested again only while it is being solved.
             self._known = {k: self._infer(k, verdicts)}
         return self._known[k]
+
+    def frame_of(self, k: int, verdicts: Verdicts = NO_VERDICTS) -> int:
+        """Return the frame whose positions serve frame k: with verdicts its own, else the first of those alike."""
+        return self._shared[k] if verdicts is NO_VERDICTS else k
 
     @property
     def fringes(self) -> FringeCalibration | None:
@@ -81,6 +87,22 @@ class PositionEstimates:
         if evidence.contacts.count == 0:
             return None
         return infer_frame(evidence, self._evidence.settings, frame_generator(k), self._workers)
+
+
+def _shared_frames(snapshots: Sequence[Snapshot], alike: int) -> list[int]:
+    """Return the first of the photographs that each is alike to, whatever is requested in which order."""
+    first: list[int] = []
+    for k, snapshot in enumerate(snapshots):
+        begin = first[-1] if k else 0
+        begin = k if k - begin >= alike or _load_changes(snapshots[begin], snapshot) else begin
+        first.append(begin)
+    return first
+
+
+def _load_changes(one: Snapshot, two: Snapshot) -> bool:
+    if one.load is None or two.load is None:
+        return False
+    return bool(np.any(np.abs(two.load - one.load) > STEADY_LOAD * np.abs(two.load)))
 
 
 def frame_generator(k: int) -> np.random.Generator:

@@ -12,7 +12,6 @@ from ..assessment.expected_correlation import expect_correlation
 from ..assessment.mixture_trust import LEAST_WEIGHT, evident_position_weight, motion_reliability
 from ..assessment.motion_information import MotionInformation, measure_motion_information, motion_scale
 from ..assessment.status import is_suspect
-from ..baselines.motion_free import overlap_balance
 from ..bodies.grains import Array
 from ..bodies.holes import find_holes
 from ..bodies.motion import shear_over
@@ -167,10 +166,10 @@ def _with_agreements(
     problem: FrameProblem, evidence: Evidence, estimate: Estimate, posterior: FramePosterior
 ) -> Evidence:
     """Add the correlations of f_n between the estimates of a frame, over the contacts of either."""
-    sequence, overlap = problem.sequence, problem.settings.overlap
-    assert overlap is not None
-    noise = float(np.hypot(problem.snapshot.sigma, overlap))  # surfaces are no smoother than that
-    contacts, force = overlap_balance(problem.packing, sequence.snapshots, problem.k, noise)
+    sequence = problem.sequence
+    assert sequence.positions is not None
+    assert sequence.overlap_balance is not None
+    contacts, force = sequence.overlap_balance(sequence.positions.frame_of(problem.k, problem.verdicts))
     motion, geometry = (estimate.contacts.key, estimate.fn), (posterior.contacts.key, posterior.fn)
     balance = contacts.key, force[:, 0]
     return replace(

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bodies.grains import Array
 from ..bodies.motion import FrameMotion, Snapshot
 from ..bodies.packing import Packing
 from ..bodies.walls import Walls
+from ..contacts.contacts import Contacts
 from ..contacts.verdicts import NO_VERDICTS, Verdicts
 from ..detection.refinement import RefinedBlock
 from ..mixture.position_estimates import PositionEstimates
@@ -26,6 +28,8 @@ class SequenceProblem:
     settings: SequenceSettings
     inferred: int = 0  # grains that no photograph shows
     positions: PositionEstimates | None = None  # position-only estimates; None: not used
+    # Balance of the overlaps of a frame, on its contacts; None: positions are not used.
+    overlap_balance: Callable[[int], tuple[Contacts, Array]] | None = None
     known: int = 0  # grains that any frame shows
     reversed_at: NDArray[np.bool_] | None = None  # (f,) whether the loading reverses there; None: not examined
 

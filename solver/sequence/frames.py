@@ -8,14 +8,18 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..baselines.motion_free import overlap_balance
+from ..bodies.grains import Array
 from ..bodies.interpolation import interpolate_ignored_frames
 from ..bodies.motion import Snapshot
 from ..bodies.packing import Packing
+from ..contacts.contacts import Contacts
 from ..contacts.verdicts import NO_VERDICTS, Verdicts, find_ignored
 from ..detection.displacement import find_reversals
 from ..detection.precision import corrected_precision, describe_contradiction, measure_precision, scale_precision
@@ -165,15 +169,25 @@ def _prepare(
     else:
         snapshots = interpolate_ignored_frames(snapshots, excluded)
         snapshots, settings, remark = _with_measured_precision(packing, snapshots, settings)
-    positions = None
+    positions = balance = None
     if settings.uses_positions and len(snapshots) > 1:
         positions = PositionEstimates(
             packing, snapshots, settings.posterior, settings.workers, posteriors, alike=settings.alike
         )
+        assert settings.overlap is not None
+        # Photographs alike request that of the same frame.
+        balance = lru_cache(maxsize=1)(partial(_balance_overlaps, packing, snapshots, settings.overlap))
     sequence = SequenceProblem(
-        packing, snapshots, settings, packing.inferred, positions, known, _find_reversals(snapshots, settings)
+        packing, snapshots, settings, packing.inferred, positions, balance, known, _find_reversals(snapshots, settings)
     )
     return _Ready(sequence, failed, remark)
+
+
+def _balance_overlaps(
+    packing: Packing, snapshots: Sequence[Snapshot], overlap: float, k: int
+) -> tuple[Contacts, Array]:
+    """Balance the overlaps of frame k; overlap [m]: typical one, surfaces are no smoother than that."""
+    return overlap_balance(packing.at_frame(snapshots, k), snapshots, k, float(np.hypot(snapshots[k].sigma, overlap)))
 
 
 def _find_reversals(snapshots: Sequence[Snapshot], settings: SequenceSettings) -> NDArray[np.bool_] | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...solver.bodies.grains import Array
 from ...solver.convex.program import SLIP_SIGMAS
 from ...solver.detection.displacement import displacement_scale
 from ...tracks import Tracks
@@ -12,7 +11,6 @@ from ...tracks import Tracks
 HIDDEN = 0.5  # displacement over the noise of a sliding: below it most of what is read is noise
 VISIBLE = 1.5  # the same over the span that is chosen
 MAX_SPAN = 8  # r(f_n) is flat around VISIBLE, from three to five photographs; wider spans miss events
-STEADY_LOAD = 0.1  # relative change of a load from one photograph to the next, at most
 SAMPLES = 5  # intervals from which a displacement is read
 LEAST_INTERVALS = 4  # of the chosen length in the sequence
 
@@ -52,14 +50,12 @@ def choose_span(tracks: Tracks) -> tuple[int, str]:
     return 1, ""
 
 
-def count_alike(tracks: Tracks, load: Array | None = None) -> int:
+def count_alike(tracks: Tracks) -> int:
     """Count the photographs so close together that one estimate from positions serves them all.
 
     Parameters
     ----------
     tracks : Tracks
-    load : (f, w), optional
-        Loads [N] of the walls, NaN: none.
 
     Returns
     -------
@@ -69,13 +65,10 @@ def count_alike(tracks: Tracks, load: Array | None = None) -> int:
     Notes
     -----
     The least m with s(m) ≥ 1.5 · 2.8 σ, as in `choose_span`, also where sliding is read from one to the next: within m
-    photographs grains move less than the noise of a sliding lets one see well. Where loads change by more than a tenth
-    from one photograph to the next, m is 1.
+    photographs grains move less than the noise of a sliding lets one see well.
     """
     present, frames = tracks.present, tracks.frame_count
     if frames < 2 * LEAST_INTERVALS or not present.any():
-        return 1
-    if load is not None and np.any(np.abs(np.diff(load, axis=0)) > STEADY_LOAD * np.abs(load[1:])):
         return 1
     limit = VISIBLE * SLIP_SIGMAS * float(np.sqrt(np.mean(tracks.sigma[present] ** 2)))
     widest = min(MAX_SPAN, (frames - 1) // LEAST_INTERVALS)

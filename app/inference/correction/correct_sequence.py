@@ -87,7 +87,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
             tracks, walls, calibration = calibrate_tracks(*observed)
     if not nothing_seen:  # calibration has measured the noise that hides the sliding
         span, remarks[4] = choose_span(tracks)
-        alike = span if settings.sequence.soft else max(span, count_alike(tracks, walls.load))
+        alike = span if settings.sequence.soft else max(span, count_alike(tracks))
         settings = replace(settings, sequence=replace(settings.sequence, span=span, alike=alike))
     if settings.infer_unseen:
         tracks = add_unseen(tracks, walls, known_radii(given.radius), settings.sequence.measured_overlap)

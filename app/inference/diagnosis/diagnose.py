@@ -36,7 +36,7 @@ from .direct_tests import (
 from .distortion import undistorted
 from .resistance import examine_resistance
 from .rivals import rivals_of
-from .trial import TRIAL_PHOTOGRAPHS, Trial, select_window, solve_trial, trial_score
+from .trial import SETTLED, TRIAL_PHOTOGRAPHS, Trial, select_window, solve_trial, trial_score
 
 # Rise of arctanh r that a rival must reach over the given input, and over all other causes. On correct input, and where
 # the model lacks physics that no rival has, the highest rise was 0.13 (seed 40, six scenarios).
@@ -131,13 +131,15 @@ def diagnose_solved(inputs: Inputs, results: Results, progress: Progress = no_pr
     Returns
     -------
     list of Finding
-        Rivals are compared only where some photographs have an expected r below DOUBTFUL.
+        Rivals are compared only where some photographs that a trial judges have an expected r below DOUBTFUL: the
+        first one, to which no motion leads, is no reason.
     """
     check = results.friction_check
     slides = check is None or not check.agrees or not float(np.nanmin(check.gap, initial=np.inf)) < DOUBTFUL_GAP
     expected = np.array([frame.expected_correlation for frame in results.frames])
     window = min(TRIAL_PHOTOGRAPHS, len(expected))
-    mean = np.array([_mean(expected[k : k + window]) for k in range(len(expected) - window + 1)])
+    judged = expected[min(SETTLED, window - 1) :]
+    mean = np.array([_mean(judged[k : k + max(window - SETTLED, 1)]) for k in range(len(expected) - window + 1)])
     if np.isfinite(mean).any() and np.nanmin(mean) < DOUBTFUL:
         first = int(np.nanargmin(mean))
         return diagnose(inputs, solve_trial(inputs, first=first), progress, first=first)

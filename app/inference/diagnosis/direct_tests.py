@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import islice
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -114,11 +117,11 @@ def examine_walls(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     allowed = max(DRIFT_SIGMAS * float(np.nanmedian(tracks.position_sigma)), DRIFT * float(tracks.radius.mean()))
     found = []
     for w in np.flatnonzero(walls.sides == STRAIGHT).tolist():
-        gap = np.array([_near_gap(tracks, walls, k, w) for k in range(tracks.frame_count)])
-        gap = gap[np.isfinite(gap)]
-        if len(gap) < 3:
+        forward, back = (_known_gaps(tracks, walls, w, order) for order in (1, -1))
+        begin, end = list(islice(forward, 1)), list(islice(back, 3))
+        if len(end) < 3:
             continue
-        last = float(np.median(gap[-3:] - gap[0]))
+        last = float(np.median(np.array(end) - begin))
         loaded = np.isfinite(walls.pressure[w]) or (walls.load is not None and np.isfinite(walls.load[:, w]).any())
         still = float(np.abs(walls.endpoints[:, w] - walls.endpoints[0, w]).max()) < allowed
         if still and (last < -allowed or (loaded and last > allowed)):
@@ -223,9 +226,11 @@ def examine_wall_times(tracks: Tracks, walls: WallTracks) -> list[Finding]:
         return float(np.max(np.median(gaps, axis=1))) if np.isfinite(gaps).all() else np.nan
 
     own = misfit(0)
+    if not own > LAGGING * allowed:
+        return []
     for shift, words in ((1, "late"), (-1, "early")):
         other = misfit(shift)
-        if own > LAGGING * allowed and other < allowed:
+        if other < allowed:
             evidence = (
                 f"the walls are one photograph {words}: rods are {1e3 * own:.2g} mm off, else {1e3 * other:.2g} mm"
             )
@@ -235,7 +240,7 @@ def examine_wall_times(tracks: Tracks, walls: WallTracks) -> list[Finding]:
 
 def _shear_rate(tracks: Tracks, k: int) -> float:
     """Rate of shear [1/s] of the step to photograph k; NaN with too few rods."""
-    both, time = tracks.present[k - 1] & tracks.present[k], float(tracks.time[k] - tracks.time[k - 1])
+    both, time = tracks.present_in(k - 1) & tracks.present_in(k), float(tracks.time[k] - tracks.time[k - 1])
     if int(both.sum()) < 4 or not time > 0.0:
         return np.nan
     gradient = displacement_gradient(
@@ -246,7 +251,7 @@ def _shear_rate(tracks: Tracks, k: int) -> float:
 
 def _distance(tracks: Tracks, k: int, other: int) -> float:
     """Rms displacement of the rods from one photograph to another [m]; NaN where they have no rod in common."""
-    both = tracks.present[k] & tracks.present[other]
+    both = tracks.present_in(k) & tracks.present_in(other)
     moved = tracks.position[other, both] - tracks.position[k, both]
     return float(np.sqrt(np.mean(moved**2))) if len(moved) else np.nan
 
@@ -279,11 +284,17 @@ def _shortened_by_sorting(tracks: Tracks, step: Array) -> float:
     return shorter if shorter > SORTED else 0.0
 
 
+def _known_gaps(tracks: Tracks, walls: WallTracks, w: int, order: int) -> Iterator[float]:
+    """Gaps [m] of wall w in the photographs that show one, from the first (order 1) or from the last (−1)."""
+    gaps = (_near_gap(tracks, walls, k, w) for k in range(tracks.frame_count)[::order])
+    return (gap for gap in gaps if np.isfinite(gap))
+
+
 def _near_gap(
     tracks: Tracks, walls: WallTracks, k: int, w: int, at: int | None = None, *, nearest: int = NEAREST
 ) -> float:
     """Gap [m] between a wall and one of the nearest rods beside it; at: photograph of the wall, k by default."""
-    here = np.flatnonzero(tracks.present[k])
+    here = np.flatnonzero(tracks.present_in(k))
     ends = walls.endpoints[k if at is None else at, w]
     here = here[beside_wall(ends, None, tracks.position[k, here], np.zeros(len(here)))]
     if len(here) < nearest:

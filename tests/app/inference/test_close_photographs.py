@@ -48,11 +48,3 @@ def test_photographs_share_an_estimate_from_positions_while_grains_move_less_tha
     assert count_alike(tracks_moving(7e-5)) == 1
     assert count_alike(tracks_moving(0.0)) == 1  # forces may change without motion
     assert count_alike(tracks_moving(1.2e-5).frames(0, 7)) == 1  # too few intervals
-
-
-def test_photographs_under_changing_loads_share_nothing() -> None:
-    tracks = tracks_moving(1.2e-5)
-    load = np.full((tracks.frame_count, 2), [700.0, np.nan])
-    assert count_alike(tracks, load) > 1
-    load[5:, 0] = 900.0
-    assert count_alike(tracks, load) == 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numba
 import numpy as np
 import pytest
@@ -49,3 +51,13 @@ def test_close_photographs_share_the_posterior_of_the_first_of_every_span(soft) 
     assert judged is not None
     assert own is not None
     assert np.array_equal(judged.fn, own.fn)  # a frame with verdicts has a posterior of its own
+
+
+def test_photographs_under_another_load_share_no_posterior(soft) -> None:
+    loaded = [
+        replace(each, load=np.full(len(each.endpoints), 700.0 if k < 4 else 900.0))
+        for k, each in enumerate(soft.snapshots)
+    ]
+    shared = PositionEstimates(soft.packing, loaded, FEW_SWEEPS, alike=3)
+    assert [shared.frame_of(k) for k in range(len(loaded))][:6] == [0, 0, 0, 3, 4, 4]
+    assert shared.frame_of(5, Verdicts(reset=True)) == 5

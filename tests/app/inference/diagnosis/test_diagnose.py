@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -76,3 +77,20 @@ def test_the_documentation_lists_every_cause():
     page = (ROOT / "app/docs/trust.md").read_text(encoding="utf-8")
     for name, cause in CAUSES.items():
         assert f"| `{name}` | {cause.effect} | {cause.cure} |" in page
+
+
+@pytest.mark.parametrize(("expected", "compared"), [
+    ([0.6, 0.7, 0.98, 0.98, 0.98, 0.98, 0.98, 0.98], None),  # no motion leads to the first one
+    ([0.6, 0.97, 0.98, 0.98, 0.98, 0.9, 0.85, 0.9], 2),
+    ([0.6, 0.9], 0),
+])  # fmt: skip
+def test_rivals_are_compared_where_photographs_that_a_trial_judges_are_doubtful(
+    monkeypatch: pytest.MonkeyPatch, expected: list[float], compared: int | None
+) -> None:
+    begun: list[int] = []
+    monkeypatch.setattr(module, "solve_trial", lambda *_, first: begun.append(first))
+    monkeypatch.setattr(module, "diagnose", lambda *_, **__: [])
+    frames = [SimpleNamespace(expected_correlation=each) for each in expected]
+    results = SimpleNamespace(friction_check=None, frames=frames)
+    module.diagnose_solved(None, results)  # type: ignore[arg-type]
+    assert begun == ([] if compared is None else [compared])
