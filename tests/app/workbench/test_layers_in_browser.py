@@ -50,7 +50,7 @@ def shown(tab: Page, **layers: dict | bool) -> np.ndarray:
         workbench.stage.redraw();
     }""", settings)  # fmt: skip
     idle(tab)
-    tab.evaluate("workbench.stage.composed()")  # which asks for the motions that these layers need
+    tab.evaluate("workbench.stage.composed()")  # which requests the motions that these layers need
     tab.wait_for_function("import('/page/layers/rods.js').then((rods) => rods.isLoaded())")
     png = tab.evaluate("workbench.stage.composed().toDataURL('image/png')")
     return read_picture(b64decode(png.split(",")[1]))
