@@ -19,7 +19,9 @@ from ..calibration.gaps import MeasuredSequence
 from ..quantity import Quantity
 
 MAX_STRETCH_SDS = 4.0  # standard deviations of a length: smaller changes are noise …
-MIN_STRETCH = 1e-4  # … and of the length
+MIN_STRETCH = 1e-5  # … and of the length
+FEWEST_CHANGES = 3  # of the slope of a length over time, from which its noise is read, …
+DOUBTED = 3.0  # … times this, as few changes determine it badly
 TOUCHING = 4.0  # standard deviations of a gap, and …
 WALL_TOLERANCE = 1e-2  # … mean radii: half the width of the gaps of touching grains
 COMMON_ERROR = 5e-2  # mean radii: error of the given wall and of all radii together, at most
@@ -73,12 +75,14 @@ def find_wall_bars(sequence: MeasuredSequence, noise: float, end_kind: NDArray[n
 
     Notes
     -----
-    A length changes significantly if max |ℓ − ℓ_0| > max(4 √2 noise, 10⁻⁴ ⟨ℓ⟩).
+    A length changes significantly if max |ℓ − ℓ_0| > max(4 σ, 10⁻⁵ ⟨ℓ⟩), σ the noise of a length: √2 noise, or less
+    where its slope over time changes by less from photograph to photograph. Ends of a simulation have none, and at rest
+    a packing may move no more than their corners do.
     """
     ends = sequence.endpoints
     length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
     stretch = np.abs(length - length[:1]).max(axis=0) / length.mean(axis=0)
-    limit = np.maximum(MAX_STRETCH_SDS * np.sqrt(2.0) * noise, MIN_STRETCH * length.mean(axis=0))
+    limit = np.maximum(MAX_STRETCH_SDS * _length_noise(length, noise), MIN_STRETCH * length.mean(axis=0))
     stretches = stretch * length.mean(axis=0) > limit
     corner = np.where(end_kind < 0, stretches, end_kind == 1) & (
         all_sides(sequence.side, sequence.wall_count) == STRAIGHT
@@ -90,6 +94,13 @@ def find_wall_bars(sequence: MeasuredSequence, noise: float, end_kind: NDArray[n
     return Bars(slip, corner, stretch, end_fraction), points
 
 
+def _length_noise(length: Array, noise: float) -> Array:
+    """Standard deviations (w,) of the lengths (f, w) [m] of bars whose ends have at most this noise."""
+    change = np.diff(length, 2, axis=0) / np.sqrt(6.0)  # √6: second difference of independent errors
+    seen = DOUBTED * np.sqrt(np.mean(change**2, axis=0)) if len(change) >= FEWEST_CHANGES else np.inf
+    return np.minimum(np.sqrt(2.0) * noise, seen)
+
+
 def _first_end_fraction(sequence: MeasuredSequence, w: int, length: Array) -> float:
     """Find the fraction of the change of length at end 0 for which most grains roll on the wall.
 
@@ -97,7 +108,8 @@ def _first_end_fraction(sequence: MeasuredSequence, w: int, length: Array) -> fl
     -----
     The fraction a maximises ⟨1/(1 + ((d − a Δℓ)/σ)²)⟩, with d the displacement of a grain's surface along the wall
     from end 0, Δℓ the change of length meanwhile and σ its noise. 0 or 1 is taken where its mean is at least 0.97 of
-    the maximum. NaN: too few grains touch the wall.
+    the maximum; where that holds for both, the one for which the bar moves less along itself. NaN: too few grains touch
+    the wall.
     """
     moved, stretched, noise = _surface_motion(sequence, w, length)
     if len(moved) < FEWEST_TOUCHING:
@@ -105,10 +117,18 @@ def _first_end_fraction(sequence: MeasuredSequence, w: int, length: Array) -> fl
     left = moved[:, None] - END_FRACTIONS * stretched[:, None]
     agreement = (1.0 / (1.0 + (left / noise[:, None]) ** 2)).mean(axis=0)
     best = float(agreement.max())
-    for held in (0.0, 1.0):  # most apparatuses have a hinge at one end
+    for held in _still_first(sequence.endpoints[:, w], length):  # most apparatuses have a hinge at one end
         if agreement[np.argmin(np.abs(END_FRACTIONS - held))] >= HINGE_AGREEMENT * best:
             return held
     return float(END_FRACTIONS[np.argmax(agreement)])
+
+
+def _still_first(ends: Array, length: Array) -> list[float]:
+    """The fractions 0 and 1 of a bar (f, 2, 2) [m], first the one for which it moves less along itself."""
+    along = np.diff(ends, axis=1)[:, 0] / length[:, None]
+    first = np.einsum("fk,fk->f", np.diff(ends[:, 0], axis=0), along[1:])
+    moved = {held: float(np.abs(first + held * np.diff(length)).sum()) for held in (0.0, 1.0)}
+    return sorted(moved, key=lambda held: moved[held])
 
 
 def _surface_motion(sequence: MeasuredSequence, w: int, length: Array) -> tuple[Array, Array, Array]:

@@ -9,7 +9,7 @@ MeasuredPreset = Literal["photoelastic"]  # no experiment, but the output of ano
 FringedPreset = Literal["fringes", "stiff_fringes"]  # photographs of photoelastic discs
 Group = Literal["correct", "missing physics", "wrong input"]
 ScenarioName = Literal[
-    "shear", "sheared", "biaxial", "isotropic", "rising_loads", "gravity",
+    "shear", "sheared", "biaxial", "isotropic", "rising_loads", "rising_corners", "gravity",
     "soft", "softer", "soft_radii_03", "soft_radii_1", "soft_noise", "softer_noise",
     "soft_stretched", "softer_stretched", "soft_unseen", "nearly_jammed",
     "corners", "short_walls", "unseen", "camera", "centres", "radii_03", "radii_1", "radius_offset",

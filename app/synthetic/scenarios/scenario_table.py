@@ -88,6 +88,7 @@ class Scenario:
 
 SHEAR = LoadingPath(shear, 0.25, plates=("top",))
 SOFT = LoadingPath(shear, 0.25, plates=("top",), settings=DemSettings(normal_stiffness=1.6e6))
+RISING = LoadingPath(load_isotropically, 0.0, measured=("top", "right"), settings=DemSettings(normal_stiffness=2e8))
 SOFTER = replace(SOFT, settings=DemSettings(normal_stiffness=3e5))
 HEAP = DemSettings(pressure=float("nan"), gravity=(0.0, -9.81), normal_stiffness=2e6)
 DISCS = DemSettings(normal_stiffness=4e5, friction=0.3, wall_friction=0.3, base_friction=10.0)
@@ -145,10 +146,9 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     "rising_loads": Scenario(
         "loaded and unloaded from two sides between 1 and 3 times 50 kPa, both loads measured; contacts ten times as "
         "stiff, so that almost nothing slides",
-        LoadingPath(
-            load_isotropically, 0.0, measured=("top", "right"), settings=DemSettings(normal_stiffness=2e8)
-        ),
+        RISING,
     ),
+    "rising_corners": Scenario("the same; walls end where the bars meet", RISING, state_corners),
     "gravity": Scenario(
         "a heap with a free surface, pushed by its right wall; no plate",
         LoadingPath(push_heap, 0.002, settings=HEAP, open_top=True),

@@ -18,7 +18,7 @@ RADIUS, FRAMES, SIDE, NOISE = 8e-3, 8, 0.4, 5e-6
 UNSPECIFIED, BAR, CORNER = np.full(4, -1, np.int8), np.zeros(4, np.int8), np.ones(4, np.int8)
 
 
-def sheared_box(*, rolling: float = 0.6, seed: int = 0) -> tuple[MeasuredSequence, np.ndarray]:
+def sheared_box(*, rolling: float = 0.6, seed: int = 0, noise: float = NOISE) -> tuple[MeasuredSequence, np.ndarray]:
     """Make rods at the walls, a fraction of which rolls with its wall while the others slide; and the true bars.
 
     The side bars are hinged at their lower ends and stay as long as they are; the lid is lifted as the box shears.
@@ -42,7 +42,7 @@ def sheared_box(*, rolling: float = 0.6, seed: int = 0) -> tuple[MeasuredSequenc
             slide = np.zeros(FRAMES) if rng.random() < rolling else 2e-4 * rng.normal(size=FRAMES).cumsum()
             place.append(bars[:, w, 0] + (s + slide)[:, None] * unit + RADIUS * inward)
             rotation.append(angle - angle[0])
-    position = np.stack(place, axis=1) + NOISE * rng.normal(size=(FRAMES, len(place), 2))
+    position = np.stack(place, axis=1) + noise * rng.normal(size=(FRAMES, len(place), 2))
     shape = position.shape[:2]
     return MeasuredSequence(
         np.full(shape[1], RADIUS),
@@ -104,6 +104,26 @@ def test_a_hinge_that_no_rod_shows_is_reported_as_unknown() -> None:
     assert np.ptp(np.linalg.norm(points[:, 3, 1] - points[:, 3, 0], axis=1)) < 1e-12
     _, boundary = correct_boundary(far, NOISE, UNSPECIFIED, BoundarySettings(camera=False))
     assert any("hinge is unknown" in each for each in boundary.describe(("floor", "right", "lid", "left")))
+
+
+def test_corners_of_a_packing_at_rest_slide_where_the_bar_would_move_though_noise_hides_it_from_the_rods() -> None:
+    """All shrinks alike, by less than the noise of a rod from photograph to photograph; the walls' ends have none."""
+    sequence, _ = sheared_box(rolling=1.0)
+    squeezed = 1.0 - 1e-5 * np.arange(FRAMES)
+    corner = SIDE * squeezed[:, None, None] * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    ends = np.stack([corner, np.roll(corner, -1, axis=1)], axis=2)
+    noise = sequence.position - sheared_box(rolling=1.0, noise=0.0)[0].position
+    position = sequence.position[0] * squeezed[:, None, None] + noise
+    at_rest = replace(sequence, endpoints=ends, position=position, rotation=np.zeros_like(sequence.rotation))
+    found, points = find_wall_bars(at_rest, NOISE, UNSPECIFIED)
+    assert found.corner.all()
+    assert found.end_fraction.tolist() == [0.0, 0.0, 1.0, 1.0]
+    assert max(np.abs(speed_along(points, w)).max() for w in range(4)) < 1e-12
+    for seed in range(40):
+        shaken = replace(at_rest, endpoints=ends + 2e-5 * np.random.default_rng(seed).normal(size=ends.shape))
+        length = np.linalg.norm(np.diff(shaken.endpoints, axis=2)[:, :, 0], axis=2)
+        within = np.abs(length - length[0]).max(axis=0) < 4.0 * np.sqrt(2.0) * 2e-5
+        assert not (within & find_wall_bars(shaken, 2e-5, UNSPECIFIED)[0].corner).any()  # noise of the ends
 
 
 def test_specified_kind_of_ends_is_used() -> None:
