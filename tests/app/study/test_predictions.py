@@ -106,7 +106,7 @@ def test_the_verdict_names_what_contradicts_the_forces():
     assert not predicted(WRONG).good
     verdict = predicted(WRONG).verdict()
     assert verdict.startswith("Something is wrong: expected r(f_n) 0.")
-    assert "agree" in verdict or "correct the measured motion" in verdict
+    assert "out of balance" in verdict or "correct the measured motion" in verdict
     hidden = Prediction(replace(GOOD, noise=1.2e-4), Trial((WRONG,), 1))
     assert hidden.verdict().startswith("These data cannot carry forces: noise is 1.0 of the motion")
     assert "every third photograph, --frames ::3" in Prediction(GOOD, Trial((SOUND,), 3)).verdict()

@@ -44,7 +44,7 @@ def test_without_further_penalties_the_assessment_is_that_of_the_evidence():
 @pytest.mark.parametrize(
     ("evidence", "word"),
     [
-        (replace(ASSESSED, agreement=0.3, overlap_agreement=0.2), "by more than 0.30"),
+        (replace(ASSESSED, agreement=0.3, disagreement=0.3), "agree by 0.30 only"),
         (replace(ASSESSED, correction=0.8), "ε = 0.8"),
         (replace(ASSESSED, disagreement=0.6), "disagree by 60 %"),
         (with_information(beyond=9), "9 grains are beyond a wall"),

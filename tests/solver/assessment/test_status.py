@@ -42,7 +42,7 @@ def test_sound_evidence_is_settled_and_trusted():
     assert 0.5 < trust(SOUND) < motion_assessment(SOUND).expected_correlation < 1.0
     compared = replace(SOUND, agreement=0.94, position_agreement=0.93, overlap_agreement=0.9)
     contradicted = replace(compared, agreement=0.4, overlap_agreement=0.4)
-    assert trust(compared) > trust(contradicted) + 0.05  # two estimates that agree are evidence
+    assert 1.0 - trust(contradicted) > 1.5 * (1.0 - trust(compared))  # two estimates that agree are evidence
 
 
 @pytest.mark.parametrize(
