@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -178,6 +178,10 @@ class Tracks:
             parts.append(f"{_counted(self.inferred, 'rod')} inferred")
         return ", ".join(parts)
 
+    def frame(self, k: int) -> Tracks:
+        """Return one frame: its properties cost nothing for all others."""
+        return self.frames(k, k + 1)
+
     def frames(self, start: int, stop: int, step: int = 1) -> Tracks:
         """Return every step-th of the frames start … stop − 1."""
         part = slice(start, stop, step)
@@ -189,6 +193,18 @@ class Tracks:
             None if self.failed_reason is None else self.failed_reason[part],
             self.inferred, self.boundary, None if self.fringes is None else self.fringes[part],
         )  # fmt: skip
+
+
+def held_once(column: NDArray[Any]) -> NDArray[Any]:
+    """Return a column whose values are all the same as a view of one of them, which takes no memory; others as given.
+
+    The view is read-only. Of tables, the precision and the status of poses are such columns, and correlations are NaN.
+    """
+    if not column.size:
+        return column
+    first = column.flat[0]
+    same = np.isnan(column) if column.dtype.kind == "f" and np.isnan(first) else column == first
+    return np.broadcast_to(first, column.shape) if same.all() else column
 
 
 def _counted(marked: ArrayLike, noun: str) -> str:

@@ -19,6 +19,9 @@ SHELLS = ("bash", "zsh", "tcsh")
 # Of linear algebra, read where it is loaded; `process.machine.linear_algebra` states why one thread, and limits callers
 # that have loaded it before.
 THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+# [ms] after which the allocator of the recording's library returns freed memory, read where it is loaded. By its own
+# delay the memory of a recording grows by 30 MB in 1000 photographs of 250 rods; at once it takes 3 % more time.
+PURGE_DELAY = ("MIMALLOC_PURGE_DELAY", "0")
 # New objects until cycles are looked for (Python: 700). Modules make a million objects, all of which stay.
 NEW_OBJECTS = 50_000
 
@@ -29,6 +32,7 @@ def main(arguments: list[str] | None = None) -> None:
     gc.set_threshold(NEW_OBJECTS)
     for name in THREADS:
         os.environ.setdefault(name, "1")
+    os.environ.setdefault(*PURGE_DELAY)
     for stream in (sys.stdout, sys.stderr):  # unknown characters are replaced
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")

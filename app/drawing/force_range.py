@@ -44,8 +44,7 @@ class ForceRange:
     @classmethod
     def of_forces(cls, forces: Sequence[Array]) -> ForceRange:
         """Return the range of forces [N]; mean 1 N if there is none."""
-        fn = np.concatenate([np.empty(0), *forces])
-        fn = fn[np.isfinite(fn) & (fn > 0.0)]
+        fn = np.concatenate([np.empty(0), *(each[np.isfinite(each) & (each > 0.0)] for each in forces)])
         if len(fn) == 0:
             return cls(1.0, 4.0)
         mean = float(fn.mean())

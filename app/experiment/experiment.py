@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..process.errors import InputError
 from ..solver.bodies.cell import unwrap_cell
 from ..solver.bodies.grains import Array
-from ..tracks import Tracks, TrackStatus
+from ..tracks import Tracks, TrackStatus, held_once
 from .config.dotted_keys import leaves
 from .config.experiment_file import ExperimentFile, load_config
 from .photographs import Photographs
@@ -293,9 +293,9 @@ def arrange_tracks(grains: Table, poses: Table, times: Table, precision: float) 
         time=arrange_times(times, frame_count),
         position=position,
         rotation=rotation,
-        sigma=np.where(present, precision, np.nan),
-        zncc=np.full(shape, np.nan),
-        status=np.where(present, TrackStatus.GIVEN, TrackStatus.LOST).astype(np.uint8),
+        sigma=held_once(np.where(present, precision, np.nan)),
+        zncc=np.broadcast_to(np.nan, shape),
+        status=held_once(np.where(present, np.uint8(TrackStatus.GIVEN), np.uint8(TrackStatus.LOST))),
     )
 
 

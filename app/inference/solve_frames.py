@@ -73,7 +73,7 @@ def with_remarks(sequence: CorrectedSequence, forces: FrameForces) -> FrameForce
     """Report the measured noise of all frames with the first, and which contacts belong to interpolated rods."""
     if forces.frame == 0 and sequence.noise_remark:
         forces = replace(forces, reason=f"{sequence.noise_remark}; {forces.reason}")
-    interpolated = sequence.tracks.interpolated[forces.frame]
+    interpolated = sequence.tracks.frame(forces.frame).interpolated[0]
     if not interpolated.any():
         return forces
     contacts, padded = forces.contacts, np.append(interpolated, False)

@@ -35,7 +35,10 @@ COMPILERS = ("numba", "llvmlite")
 PREFIX = "rodsight-kernels-"
 KEY_LENGTH = 16  # hexadecimal digits
 KEPT = 30 * 86400.0  # [s] after the last use of the kernels of other sources until they are removed
-TOUCHED = 86400.0  # [s] at least between two notes that a folder is used
+MOST = 1 << 30  # [bytes] of all kernels, beyond which those of other sources go, the longest unused first …
+RECENT = 7200.0  # [s] … except those used since then: a process that lacks them compiles them again
+TOUCHED = 3600.0  # [s] at least between two notes that a folder is used
+SEARCHED = 86400.0  # [s] after the last use of a folder until old ones are looked for; a new folder looks at once
 
 
 def choose_kernel_cache() -> None:
@@ -129,11 +132,32 @@ def _set(variable: str, name: str, value: str) -> None:
 
 
 def remove_old(parent: Path, now: float) -> None:
-    """Remove kernels of other sources that were not used for a while; now: time [s] since the epoch."""
+    """Remove kernels of other sources that were not used for a while, or that are too many.
+
+    Every edit of a kernel makes others, of 10 to 200 MB: a developer's disk would fill within weeks.
+
+    now: time [s] since the epoch.
+    """
+    used = []
     for folder in parent.glob(f"{PREFIX}*"):
         with suppress(OSError):
-            if now - folder.stat().st_mtime > KEPT:
-                shutil.rmtree(folder, ignore_errors=True)
+            used.append((folder.stat().st_mtime, folder))
+    size = 0
+    for last, folder in sorted(used, reverse=True):
+        if now - last > KEPT or (now - last > RECENT and size > MOST):
+            shutil.rmtree(folder, ignore_errors=True)
+        elif size <= MOST:
+            size += _size_of(folder)
+
+
+def _size_of(folder: Path) -> int:
+    """Return the bytes of all files below a folder; those that vanish meanwhile do not count."""
+    size = 0
+    for place, _, names in os.walk(folder):
+        for name in names:
+            with suppress(OSError):
+                size += os.lstat(os.path.join(place, name)).st_size
+    return size
 
 
 def _parents() -> Iterable[Path]:
@@ -170,12 +194,13 @@ def _is_private(folder: Path) -> bool:
 
 
 def _note_use(folder: Path) -> None:
-    """Note that a folder is used, and remove old ones, at most once a day."""
+    """Note that a folder is used, at most once an hour; where it is new, or was unused for a day, remove old ones."""
     now = time.time()
     with suppress(OSError):
-        new = not any(folder.iterdir())
-        if new or now - folder.stat().st_mtime > TOUCHED:
+        new, unused = not any(folder.iterdir()), now - folder.stat().st_mtime
+        if new or unused > TOUCHED:
             os.utime(folder, (now, now))
+        if new or unused > SEARCHED:
             remove_old(folder.parent, now)
 
 

@@ -11,6 +11,7 @@ from rich.console import Console
 from ..experiment.experiment import CONFIG_NAME
 from ..process.errors import InputError
 from ..process.machine.browser import open_page
+from ..process.machine.free_memory import return_large_blocks
 from ..process.signals import Stopped
 from ..results.hdf5.store import origin_of
 from ..reviewing.reviewed_run import find_reviewed_results
@@ -48,6 +49,7 @@ def open_workbench(folder: Path, *, port: int, browser: bool) -> int:
     """
     if not folder.is_dir():
         raise InputError(folder, "", "is no folder; open the one that holds your photographs or experiments")
+    return_large_blocks()
     server = _make_server(Workbench(folder), port, "open")
     console = Console()
     console.print(f"Workbench of {server.workbench.root}: {server.address}", highlight=False, soft_wrap=True)
@@ -75,6 +77,7 @@ def open_review(path: Path, *, port: int, browser: bool, reviewer: str | None) -
     InputError
         There are no results, their experiment is not there, or the port is in use.
     """
+    return_large_blocks()
     file = find_reviewed_results(path).resolve()
     if file.name != RESULTS:
         raise InputError(file, "", f"is not called {RESULTS}; give the folder of a run")

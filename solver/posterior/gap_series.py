@@ -25,6 +25,8 @@ MAX_LAG = 7  # frames
 WALK_QUANTILE = 0.9  # of the absolute changes
 MIN_DIFFERENCES = 100  # a lag with fewer is not used
 MAX_SMOOTHING = 3.0  # greatest ρ: more smoothing is worse where contacts form and break
+DENSE = 256  # frames of a sequence, from which on no matrix of all pairs of frames is made
+RIDGE = 1e-12  # of the smoothing, where no frame is known
 MIN_VARIANCE_FRACTION = 0.1  # lower limit of a measured variance, over the stated one
 
 
@@ -146,7 +148,8 @@ def smooth_series(gap: Array, noise: GapNoise) -> tuple[Array, Array]:
     diagonal with 1 where the gap is known and 0 elsewhere. The fraction is the diagonal of (S + ρ DᵀD)⁻¹.
     """
     frames = len(gap)
-    step = np.diff(np.eye(frames), axis=0)
+    long = frames > DENSE
+    step = np.empty((0, 0)) if long else np.diff(np.eye(frames), axis=0)
     stiffness = noise.smoothing * step.T @ step
     smooth, variance_fraction = np.full_like(gap, np.nan), np.full_like(gap, np.nan)
     patterns, pattern_of = np.unique(np.isfinite(gap), axis=1, return_inverse=True)
@@ -154,8 +157,40 @@ def smooth_series(gap: Array, noise: GapNoise) -> tuple[Array, Array]:
         if not seen.any():
             continue
         columns = np.flatnonzero(pattern_of.ravel() == p)
-        inverse = np.linalg.inv(np.diag(seen.astype(np.float64)) + stiffness + 1e-12 * np.eye(frames))
         rows = np.ix_(seen, columns)
+        if long:
+            found, remaining = _smooth_long(gap[:, columns], seen, noise.smoothing)
+            smooth[rows], variance_fraction[rows] = found[seen], remaining[seen, None]
+            continue
+        inverse = np.linalg.inv(np.diag(seen.astype(np.float64)) + stiffness + RIDGE * np.eye(frames))
         smooth[rows] = inverse[np.ix_(seen, seen)] @ gap[rows]
         variance_fraction[rows] = np.diag(inverse)[seen][:, None]
     return smooth, variance_fraction
+
+
+def _smooth_long(gap: Array, seen: np.ndarray, smoothing: float) -> tuple[Array, Array]:
+    """Smooth gaps (f, c) that are known in the same frames (f,), in a memory and a time in proportion to f.
+
+    Returns
+    -------
+    smooth : array (f, c)
+    variance_fraction : array (f,)
+
+    Notes
+    -----
+    The matrix A of `smooth_series` has three diagonals. With a its middle one and −ρ beside it, the pivots from both
+    ends, l_k = a_k − ρ²/l_{k−1} and u_k = a_k − ρ²/u_{k+1}, give the diagonal of the inverse: 1/(l_k + u_k − a_k).
+    """
+    from scipy.linalg import solveh_banded  # imported here, as above
+
+    middle = seen + RIDGE + smoothing * np.concatenate([[1.0], np.full(len(gap) - 2, 2.0), [1.0]])
+    banded = np.stack([np.full(len(gap), -smoothing), middle])
+    smooth = solveh_banded(banded, np.where(seen[:, None], gap, 0.0))
+    return smooth, 1.0 / (_pivots(middle, smoothing) + _pivots(middle[::-1], smoothing)[::-1] - middle)
+
+
+def _pivots(middle: Array, smoothing: float) -> Array:
+    pivots = middle.tolist()
+    for k in range(1, len(pivots)):
+        pivots[k] -= smoothing**2 / pivots[k - 1]
+    return np.array(pivots)

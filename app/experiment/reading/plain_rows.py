@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 MAX_LINE = 1 << 17  # bytes: the csv module refuses longer cells
 COMMA, NEWLINE = b",\n"
 BLANK = 0x20  # bytes up to this are blanks, or are removed as such
+BLOCK = 1 << 20  # bytes that are looked through at once: what is found takes several times their memory
+CELLS = 1 << 13  # that are converted at once
 
 
 class Cells(Sequence[str]):
@@ -43,7 +45,10 @@ class Cells(Sequence[str]):
     def coded(self) -> Iterator[bytes]:
         """Yield the bytes of the cells; numbers are read from them."""
         content = self._content
-        return (content[first:end] for first, end in zip(self._start.tolist(), self._end.tolist(), strict=True))
+        for row in range(0, len(self), CELLS):
+            part = slice(row, row + CELLS)
+            for first, end in zip(self._start[part].tolist(), self._end[part].tolist(), strict=True):
+                yield content[first:end]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,11 +64,12 @@ def split_plain(content: bytes, columns: Sequence[str], optional: Sequence[str])
 
     A plain table has no quotes, no blank rows, and as many cells in every row.
     """
-    content = content.replace(b"\r\n", b"\n").removesuffix(b"\n")
+    content = content.replace(b"\r\n", b"\n")
     if not columns or b'"' in content or b"\r" in content or b"\0" in content or len(content) >= 1 << 31:
         return None
     raw = np.frombuffer(content, np.uint8)
-    place = np.append(np.flatnonzero((raw == COMMA) | (raw == NEWLINE)), len(raw)).astype(np.int32, casting="same_kind")
+    raw = raw[: len(raw) - content.endswith(b"\n")]
+    place = _ends_of_cells(raw)
     ends_row = np.append(raw[place[:-1]] == NEWLINE, True)
     last = np.flatnonzero(ends_row)  # the last cell of each row
     width = int(last[0]) + 1
@@ -76,9 +82,28 @@ def split_plain(content: bytes, columns: Sequence[str], optional: Sequence[str])
     if any(header.count(name) != 1 for name in columns):
         return None
     cells = {name: _column(content, place, width, header.index(name)) for name in columns}
-    if cells[columns[0]].has_blank(plain=content.isascii() and not np.any((raw <= BLANK) & (raw != NEWLINE))):
+    if cells[columns[0]].has_blank(plain=content.isascii() and not _has_blanks(raw)):
         return None  # the row may be blank
     return PlainRows(cells, range(2, len(last) + 1))
+
+
+def _ends_of_cells(raw: NDArray[np.uint8]) -> NDArray[np.int32]:
+    """Return the places of commas and line ends, and the length."""
+    found = [
+        (first + np.flatnonzero((block == COMMA) | (block == NEWLINE))).astype(np.int32)
+        for first, block in _blocks(raw)
+    ]
+    return np.concatenate([*found, np.array([len(raw)], np.int32)])
+
+
+def _has_blanks(raw: NDArray[np.uint8]) -> bool:
+    return any(bool(np.any((block <= BLANK) & (block != NEWLINE))) for _, block in _blocks(raw))
+
+
+def _blocks(raw: NDArray[np.uint8]) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+    """Yield blocks of bytes with the places of their first ones."""
+    for first in range(0, len(raw), BLOCK):
+        yield first, raw[first : first + BLOCK]
 
 
 def _column(content: bytes, place: NDArray[np.int32], width: int, number: int) -> Cells:

@@ -179,8 +179,8 @@ def read_table(
 
 
 def _header(content: bytes) -> list[str]:
-    """Return the names in the first line of a table."""
-    with io.StringIO(content.decode("utf-8-sig"), newline="") as stream:
+    """Return the names in the first line of a table, of which no more is decoded."""
+    with io.TextIOWrapper(io.BytesIO(content), "utf-8-sig", newline="") as stream:
         return [name.strip() for name in next(csv.reader(stream), [])]
 
 
@@ -206,8 +206,11 @@ def check_frames(table: Table, frame: NDArray[np.int64]) -> int:
 
 def check_unique(table: Table, column: str, *keys: NDArray[np.int64]) -> None:
     """Raise InputError with the later row where two rows have the same keys."""
-    stacked = np.stack(keys, axis=1)
-    _, first = np.unique(stacked, axis=0, return_index=True)
-    if len(first) < len(stacked):
-        again = int(np.setdiff1d(np.arange(len(stacked)), first)[0])
+    number = np.zeros(len(table), np.int64)
+    for key in keys:  # rows with the same keys get the same number, below their count
+        _, own = np.unique(key, return_inverse=True)
+        _, number = np.unique(number * (own.max(initial=0) + 1) + own, return_inverse=True)
+    _, first = np.unique(number, return_index=True)
+    if len(first) < len(number):
+        again = int(np.setdiff1d(np.arange(len(number)), first)[0])
         raise table.error(again, column, "stands twice" + (" in its frame" if len(keys) > 1 else ""))

@@ -16,7 +16,7 @@ from ...solver.boundary.walls_in_picture import correct_walls_in_picture
 from ...solver.detection.precision import contradiction, describe_contradiction, measure_precision
 from ...solver.mixture.soft_grains import find_soft_overlap
 from ...solver.posterior.sequence_evidence import gather_position_evidence
-from ...tracks import Tracks, WallTracks
+from ...tracks import Tracks, WallTracks, held_once
 from ..snapshots import make_snapshots, measure_sequence, pack_seen
 from .calibration import radius_classes
 
@@ -44,7 +44,7 @@ def measure_noise(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, str]:
     factor = contradiction(found, _stated_noise(tracks))
     if factor == 1.0:
         return tracks, ""
-    return replace(tracks, sigma=factor * tracks.sigma), describe_contradiction(found, factor)
+    return replace(tracks, sigma=held_once(factor * tracks.sigma)), describe_contradiction(found, factor)
 
 
 def correct_camera(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...solver.bodies.grains import Array
 from ...solver.calibration.calibrate import EXCESSIVE_NOISE, Calibration, calibrate, default_priors
 from ...solver.calibration.priors import CalibrationSettings
-from ...tracks import Tracks, WallTracks
+from ...tracks import Tracks, WallTracks, held_once
 from ..snapshots import measure_sequence
 
 SEED = 0  # of the draws behind the standard deviations: the same input gives the same bits
@@ -70,14 +70,14 @@ def calibrate_tracks(
     if not found.applied:
         # A far understated noise makes detection miss contacts, whatever the errors of the centres.
         factor = found.noise_factor if found.noise_factor > EXCESSIVE_NOISE else 1.0
-        return replace(tracks, sigma=factor * tracks.sigma), walls, found
+        return replace(tracks, sigma=held_once(factor * tracks.sigma)), walls, found
     better = found.correct(measured)
     remaining = np.full(tracks.grain_count, found.position_sd(0.0))
     corrected = replace(
         tracks,
         radius=better.radius,
         position=better.position,
-        sigma=found.noise_factor * tracks.sigma,
+        sigma=held_once(found.noise_factor * tracks.sigma),
         centre_sigma=remaining,
     )
     return corrected, replace(walls, endpoints=better.endpoints), found

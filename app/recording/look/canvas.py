@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from ...solver.bodies.grains import Array
 from ...tracks import Tracks
 
 NOMINAL_RADIUS = 30.0  # px, of the mean grain, where there is no photograph
+BLOCK = 64  # frames whose bounds are found at a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,18 +36,21 @@ class Canvas:
     def around(cls, tracks: Tracks, scale: Scale | None, photograph_shape: tuple[int, int] | None = None) -> Canvas:
         """Fit the canvas to every pose of every grain; raise ValueError if there is none."""
         mean_radius = float(np.mean(tracks.radius))
-        points = tracks.position[tracks.present]
-        if len(points) == 0:
-            raise ValueError("no grain has a pose in any frame: there is nothing to draw")
         if scale is None:
             pixel_size = mean_radius / NOMINAL_RADIUS
-            scale = Scale(pixel_size, math.ceil(points[:, 1].max() / pixel_size) + 1)
+            highest = max((float(each[:, 1].max()) for each in _places(tracks)), default=0.0)
+            scale = Scale(pixel_size, math.ceil(highest / pixel_size) + 1)
         shrink = 1 if photograph_shape is None else shrink_factor(photograph_shape)
         radius = mean_radius / scale.pixel_size / shrink
-        pixels = (scale.to_pixels(points) + 0.5) / shrink
+        ends = []  # [px] of the bounds of some frames at a time
+        for each in _places(tracks):
+            pixels = (scale.to_pixels(each) + 0.5) / shrink
+            ends.append((pixels.min(axis=0), pixels.max(axis=0)))
+        if not ends:
+            raise ValueError("no grain has a pose in any frame: there is nothing to draw")
         margin = 2.2 * radius
-        left, top = pixels.min(axis=0) - margin
-        right, bottom = pixels.max(axis=0) + margin
+        left, top = np.min([low for low, _ in ends], axis=0) - margin
+        right, bottom = np.max([high for _, high in ends], axis=0) + margin
         return cls(scale, shrink, radius, float(left), float(top), float(right), float(bottom))
 
     def points(self, world: Array) -> Array:
@@ -81,3 +86,11 @@ class Canvas:
         Few distinct widths keep the recording small; multiples of a power of two are exact in float32.
         """
         return 2.0 ** round(math.log2(self.grain_radius / 120.0))
+
+
+def _places(tracks: Tracks) -> Iterator[Array]:
+    """Yield the positions (k, 2) [m] of some frames at a time, of those that have any."""
+    for first in range(0, tracks.frame_count, BLOCK):
+        some = tracks.frames(first, first + BLOCK)
+        if some.present.any():
+            yield some.position[some.present]

@@ -58,7 +58,7 @@ def write_card(scene: Scene, forces: FrameForces, statistics: FrameStatistics, t
     ]
     reasons = [] if forces.status is FrameStatus.SETTLED else [each.strip() for each in forces.reason.split(";")]
     penalties = [each.strip() for each in forces.trust_penalties.split(";")]
-    lost = scene.tracks.id[scene.tracks.lost[forces.frame]].tolist()
+    lost = scene.tracks.id[scene.tracks.frame(forces.frame).lost[0]].tolist()
     lines = [head + expected + ".", ", ".join(each for each in values if each) + "."]
     if lost:
         lines.append(f"{len(lost)} rods are lost: {', '.join(map(str, lost[:12]))}{' …' if len(lost) > 12 else ''}.")

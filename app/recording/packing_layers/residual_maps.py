@@ -60,7 +60,7 @@ def log_residual_maps(
     if len(rows) > 2:
         change[1:-1] = changes_per_sweep(rows[:-1], fn[:-1], ft[:-1]) / (SWEEP_FRACTION * mean)
         change[-1] = change[-2]
-    lost = ~scene.tracks.present[clock.frame]
+    lost = ~scene.tracks.frame(clock.frame).present[0]
     unbalance[:, lost | ~scene.grains.free] = np.nan  # boundary grains need no balance
     clock.start()
     clock.log(

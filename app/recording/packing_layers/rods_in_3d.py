@@ -24,7 +24,7 @@ CHAIN_RADIUS_FRACTION = 0.55  # of the radius of a grain, for a force at the top
 def log_rods(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     """Log rods (axis along z, front ends at z = 0) and the contacts that carry more than the mean."""
     clock.end()
-    tracks, present = scene.tracks, scene.tracks.present[clock.frame]
+    tracks, present = scene.tracks, scene.tracks.frame(clock.frame).present[0]
     position, radius = tracks.position[clock.frame], tracks.radius
     status = tracks.status[clock.frame]
     suspect = status == TrackStatus.SUSPECT

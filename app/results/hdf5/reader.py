@@ -20,6 +20,7 @@ import h5py
 import numpy as np
 
 from ...process.errors import InputError
+from ...tracks import held_once
 from ..checkpoint import restore
 from ..schema import (
     CONTACT_OFFSET,
@@ -37,7 +38,8 @@ from .lazy_sequences import LazySequence
 
 CACHED_FRAMES = 4  # most recent frames
 EVERY = slice(None)  # row
-BLOCK = 64  # frames whose numbers of sweeps are checked at once
+BLOCK = 64  # frames whose statistics are read, or whose numbers of sweeps are checked, at once
+OF_POSES = ("frame", "grain")  # dimensions of columns that are often one value, such as a given precision
 KEPT = ("kept_sweep", "kept_force")  # dimensions of sweeps with stored forces
 CACHE = 1 << 16  # [bytes] of cached decompressed values per dataset
 
@@ -60,7 +62,7 @@ class StoredRun:
         if all(self._find(each) is None for each in here if each.path.startswith(part)):
             return None
         rows = {each: frames if each.dims[:1] == ("frame",) else EVERY for each in here}
-        return restore(PARTS[part], {each.attribute: self._part(each, rows[each]) for each in here}, "")
+        return restore(PARTS[part], {each.attribute: self.part_of(each, rows[each]) for each in here}, "")
 
     def require(self, part: str) -> Any:
         """Return one of PARTS. Raises InputError where it is missing."""
@@ -87,9 +89,9 @@ class StoredRun:
 
     def frame(self, k: int, rows: _FrameRows, bodies: dict[str, int]) -> Any:
         """Read the forces of one frame."""
-        number = self._part(SWEEP_NUMBER, rows.of(k, SWEEP_NUMBER))
+        number = self.part_of(SWEEP_NUMBER, rows.of(k, SWEEP_NUMBER))
         own = {
-            each.attribute: rows.shaped(k, each, self._part(each, rows.of(k, each)), number)
+            each.attribute: rows.shaped(k, each, self.part_of(each, rows.of(k, each)), number)
             for each in entries("frames")
         }  # fmt: skip
         count = bodies["contacts.grain_count"]
@@ -100,20 +102,16 @@ class StoredRun:
         return restore(PARTS["frames"], own | bodies | {"frame": k}, "")
 
     def statistics(self) -> Sequence[Any]:
-        """Return the statistics of every frame, made on access from columns that are read at once."""
-        columns = {each.attribute: self.read(each) for each in entries("statistics")}
-
-        def statistics_of(k: int) -> Any:
-            own = {name: None if values is None else values[k] for name, values in columns.items()}
-            return restore(PARTS["statistics"], own, "")
-
-        return LazySequence(self._sizes["frame"], statistics_of)
+        """Return the statistics of every frame, read a block at a time on access; all columns are checked at once."""
+        for each in entries("statistics"):
+            self._dataset(each)
+        return StoredStatistics(self._reopened(), self._sizes["frame"])
 
     def read(self, entry: Entry) -> Any:
         """Read all values of a dataset, or its declared value where the dataset is absent."""
-        return self._part(entry, EVERY)
+        return self.part_of(entry, EVERY)
 
-    def _part(self, entry: Entry, rows: slice) -> Any:
+    def part_of(self, entry: Entry, rows: slice) -> Any:
         """Read some rows of a dataset, or its declared value where the dataset is absent."""
         dataset = self._dataset(entry)
         if dataset is None:
@@ -124,7 +122,8 @@ class StoredRun:
         values = np.asarray(dataset[part])
         if entry.quantity.names is not None:
             values = self._map_enumeration(entry, dataset, values)
-        return values.astype(entry.dtype, copy=False)[()]
+        values = values.astype(entry.dtype, copy=False)
+        return held_once(values) if entry.dims == OF_POSES else values[()]
 
     def _dataset(self, entry: Entry) -> h5py.Dataset | None:
         """Return the dataset after checking shape and type; None where it is absent. Raises InputError."""
@@ -173,7 +172,7 @@ class StoredRun:
             self._treat_as_absent("sweep")
         for k in range(0, len(count), BLOCK):  # together they are longer than all tracks
             edges = sweep[k : k + BLOCK + 1]
-            number = self._part(SWEEP_NUMBER, slice(int(edges[0]), int(edges[-1])))
+            number = self.part_of(SWEEP_NUMBER, slice(int(edges[0]), int(edges[-1])))
             if number is not None and np.any(number >= np.repeat(count[k : k + BLOCK], np.diff(edges))):
                 raise self._error(SWEEP_NUMBER, f"names a sweep beyond those of {SWEEP_COUNT.path}")
         if kept is None or any(self._find(each) is None for each in entries("frames") if each.dims[0] in KEPT):
@@ -336,6 +335,33 @@ class StoredFrames(LazySequence[Any]):
             while len(self._kept) > CACHED_FRAMES:
                 self._kept.popitem(last=False)
             return self._kept[k]
+
+
+class StoredStatistics(LazySequence[Any]):
+    """The statistics of every frame of a file, of which a block is in memory."""
+
+    def __init__(self, stored: StoredRun, count: int) -> None:
+        super().__init__(count, partial(_read_statistics, stored, count))
+        self._block: tuple[int, dict[str, Any]] = (-1, {})  # its first frame, and its columns
+        self._lock = threading.Lock()
+
+    def _item(self, k: int) -> Any:
+        with self._lock:
+            first = k - k % BLOCK
+            if first != self._block[0]:
+                self._block = first, self._make(first)
+            columns = self._block[1]
+        own = {name: None if values is None else values[k - first] for name, values in columns.items()}
+        return restore(PARTS["statistics"], own, "")
+
+
+def _read_statistics(stored: StoredRun, count: int, first: int) -> dict[str, Any]:
+    """Read the columns of a block."""
+    try:
+        rows = slice(first, min(first + BLOCK, count))
+        return {each.attribute: stored.part_of(each, rows) for each in entries("statistics")}
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+        raise InputError(stored.file, "group statistics", f"is damaged: {error}") from None
 
 
 def _read_frame(stored: StoredRun, rows: _FrameRows, bodies: dict[str, int], k: int) -> Any:

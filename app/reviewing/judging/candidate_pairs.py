@@ -60,8 +60,8 @@ def find_candidate_pairs(results: Results, frame: int, threshold: float | None =
         Gap threshold of the detector [m]; default: 6 standard deviations of a position.
     """
     tracks = results.tracks
-    position, present = tracks.position[frame], tracks.present[frame]
-    position_sd = float(tracks.position_sigma[frame])
+    position, present = tracks.position[frame], tracks.frame(frame).present[0]
+    position_sd = float(tracks.frame(frame).position_sigma[0])
     threshold = THRESHOLD_STANDARD_DEVIATIONS * position_sd if threshold is None else threshold
     walls = walls_at(results, frame)
     listed = results.frames[frame].contacts

@@ -39,4 +39,6 @@ def gap_at(results: Results, frame: int, point: Array) -> tuple[int, int] | None
 def pairs_within(results: Results, frame: int, gap: float) -> Contacts:
     """Find all pairs of one frame whose gap is below a length [m]."""
     tracks = results.tracks
-    return detect_contacts(results.grains, tracks.position[frame], tracks.present[frame], walls_at(results, frame), gap)
+    return detect_contacts(
+        results.grains, tracks.position[frame], tracks.frame(frame).present[0], walls_at(results, frame), gap
+    )

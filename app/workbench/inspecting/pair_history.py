@@ -34,10 +34,10 @@ def pair_history(results: Results, i: Body, j: Body) -> dict[str, Any] | None:
     }
     for frame in range(len(results.frames)):
         tracks, forces = results.tracks, results.frames[frame]
-        here = all(row >= n or bool(tracks.present[frame, row]) for row in (a, b))
+        here = all(row >= n or bool(tracks.frame(frame).present[0, row]) for row in (a, b))
         measured = measure_pairs(results.grains, tracks.position[frame], walls_at(results, frame), key)
         values["gap"] += rounded(measured.gap if here else [np.nan])
-        values["gap_sd"] += rounded(gap_standard_deviation(measured, float(tracks.position_sigma[frame])))
+        values["gap_sd"] += rounded(gap_standard_deviation(measured, float(tracks.frame(frame).position_sigma[0])))
         for name in ("fn", "fn_sd", "ft", "ft_sd", "probability"):
             values[name] += rounded(match_values(key, forces.contacts.key, getattr(forces, name), fill=np.nan))
         values["state"].append(bool((forces.contacts.key == key[0]).any()))

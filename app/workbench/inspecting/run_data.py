@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...drawing.force_range import ForceRange
 from ...experiment.units import Scale
+from ...process.machine.free_memory import release_free_memory
 from ...results.checkpoint import Checkpoint, flatten
 from ...results.hdf5.lazy_sequences import CachedSequence, LazySequence
 from ...results.hdf5.store import load_results, load_tracks, read_origin
@@ -25,7 +26,7 @@ from ...solver.frame_forces import FrameForces
 from ...solver.statistics.frame_statistics import FrameStatistics
 from ...tracks import Tracks, TrackStatus, WallTracks
 
-KEPT_BYTES = 32 << 20  # of frames in memory: enough for a test of fifty photographs
+KEPT_BYTES = 8 << 20  # of frames in memory: enough to go back and forth; another frame is read in some milliseconds
 NUMBERS = ("trust", "residual", "correction", "friction_angle", "coordination", "mean_fn")
 
 
@@ -41,6 +42,7 @@ class RunData:
     unfinished: UnfinishedRun | None = None
     summaries: dict[int, FrameSummary] = field(default_factory=dict)  # of frames that were read
     first: int = 0  # the photograph that its frame 0 shows
+    force_ranges: dict[int, ForceRange] = field(default_factory=dict)  # by the number of frames: there is one at most
 
     @property
     def stop(self) -> int:
@@ -187,7 +189,12 @@ def _summaries(data: RunData) -> list[FrameSummary]:
 
 def _force_range(data: RunData) -> dict[str, float]:
     """The range of widths and colours of the forces [N], the same in every frame and in the recording."""
-    found = ForceRange.of_forces([each.fn.astype(np.float64) for each in _summaries(data)])
+    count = len(data.frames)
+    found = data.force_ranges.get(count)
+    if found is None:
+        found = ForceRange.of_forces([each.fn.astype(np.float64) for each in _summaries(data)])
+        data.force_ranges[count] = found
+        release_free_memory()  # of all frames
     return {"mean": found.mean, "weak": found.weak, "top": found.top}
 
 
@@ -230,7 +237,7 @@ def frame_network(data: RunData, photograph: int, scale: Scale) -> dict[str, Any
 
 def list_rods(tracks: Tracks, frame: int, scale: Scale) -> dict[str, Any]:
     """List the rods of a frame, in pixels; lost ones are absent."""
-    here = np.flatnonzero(tracks.present[frame])
+    here = np.flatnonzero(tracks.frame(frame).present[0])
     place = scale.to_pixels(tracks.position[frame, here])
     pixel = np.maximum(scale.size_at(place), 1e-12)  # [m] at each rod
     return {

@@ -18,6 +18,7 @@ from ...out_of_date import recording_out_of_date
 from ...prediction import measure_photographs
 from ...process.errors import InputError
 from ...process.links import refuse_links
+from ...process.machine.free_memory import release_free_memory
 from ...results.manifest import MANIFEST
 from ...reviewing.reviewed_run import ReviewedRun
 from ...reviewing.session import ReviewSession
@@ -80,6 +81,7 @@ class Project:
             stamp = self.draft.stamps(table_names(data)), self._pattern_stamp(data)
             if self._validation is None or stamp != self._stamp:
                 self._stamp, self._validation = stamp, validate(self.draft)
+                release_free_memory()  # of tables
             return self._validation
 
     def quality(self) -> PictureQuality:

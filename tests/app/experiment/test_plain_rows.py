@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rodsight.experiment.reading import tables
+from rodsight.experiment.reading import plain_rows, tables
 from rodsight.experiment.reading.plain_rows import split_plain
 from rodsight.process.errors import InputError
 
@@ -24,11 +26,18 @@ def read(file, *, plain):
         return {name: table.text(name) for name in table.names}, [table.where(row) for row in range(len(table))]
 
 
-@given(body=st.lists(st.sampled_from(PIECES), max_size=30).map("".join), rows=st.integers(0, 3))
-def test_any_table_reads_as_by_the_csv_module(body, rows, tmp_path_factory):
+@given(
+    body=st.lists(st.sampled_from(PIECES), max_size=30).map("".join),
+    rows=st.integers(0, 3),
+    block=st.sampled_from((3, plain_rows.BLOCK)),
+)
+def test_any_table_reads_as_by_the_csv_module(body, rows, block, tmp_path_factory):
     file = tmp_path_factory.getbasetemp() / "some.csv"
     file.write_bytes(("x,id,y\n" + rows * "1,2,3\n" + body).encode())
-    assert read(file, plain=True) == read(file, plain=False)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plain_rows, "BLOCK", block)
+        patch.setattr(plain_rows, "CELLS", 1)
+        assert read(file, plain=True) == read(file, plain=False)
 
 
 def test_plain_rows_are_split_into_columns():
@@ -46,3 +55,19 @@ def test_plain_rows_are_split_into_columns():
 )  # fmt: skip
 def test_tables_that_are_not_plain_are_left_to_the_csv_module(content):
     assert split_plain(content, ("id", "x"), ()) is None
+
+
+def test_a_long_table_is_read_in_little_more_memory_than_that_of_its_file(tmp_path):
+    file = tmp_path / "long.csv"
+    file.write_text("id,x\n" + "".join(f"{row % 250},{row * 1.000001!r}\n" for row in range(100_000)))
+
+    def most() -> int:
+        tracemalloc.start()
+        try:
+            tables.read_table(file, ("id", "x")).numbers("x")
+            return tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+
+    most()  # modules that are loaded once
+    assert most() < 3 * file.stat().st_size  # with room for the numbers; decoded as a whole, five times

@@ -7,6 +7,7 @@ import platform
 import shutil
 import subprocess
 import sys
+import time
 import zipfile
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from rodsight.process.kernel_cache import (
     KEPT,
     NAME_VARIABLE,
     PREFIX,
+    RECENT,
     archive_name,
     choose_kernel_cache,
     folder_of_sources,
@@ -133,6 +135,37 @@ def test_kernels_that_were_not_used_for_a_while_are_removed(tmp_path):
         os.utime(tmp_path / name, (now - KEPT - 60.0,) * 2)
     remove_old(tmp_path, now)
     assert sorted(each.name for each in tmp_path.iterdir()) == ["others", f"{PREFIX}new"]
+
+
+def test_too_many_kernels_go_from_the_longest_unused_on_except_those_just_used(tmp_path, monkeypatch):
+    monkeypatch.setattr(kernel_cache, "MOST", 250)
+    ages = {"now": 0.0, "just": RECENT - 60.0, "earlier": RECENT + 60.0, "yesterday": 86400.0, "before": 2 * 86400.0}
+    now = time.time()
+    for name, age in ages.items():
+        (tmp_path / f"{PREFIX}{name}" / "solver").mkdir(parents=True)
+        (tmp_path / f"{PREFIX}{name}" / "solver" / "kernel.nbi").write_bytes(bytes(100))
+        os.utime(tmp_path / f"{PREFIX}{name}", (now - age,) * 2)
+
+    def left() -> set[str]:
+        return {each.name.removeprefix(PREFIX) for each in tmp_path.iterdir()}
+
+    remove_old(tmp_path, now)
+    assert left() == {"now", "just", "earlier"}  # the third one makes them too many
+    monkeypatch.setattr(kernel_cache, "MOST", 50)
+    remove_old(tmp_path, now)
+    assert left() == {"now", "just"}
+
+
+def test_a_new_folder_of_kernels_removes_what_is_too_much(tmp_path, monkeypatch, new_process):
+    monkeypatch.setattr(kernel_cache, "MOST", 50)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    (tmp_path / f"{PREFIX}large").mkdir()
+    (tmp_path / f"{PREFIX}large" / "kernel.nbi").write_bytes(bytes(100))
+    (tmp_path / f"{PREFIX}old").mkdir()
+    for name, age in (("large", RECENT + 60.0), ("old", 2.0 * RECENT)):
+        os.utime(tmp_path / f"{PREFIX}{name}", (time.time() - age,) * 2)
+    choose_kernel_cache()
+    assert {each.name for each in tmp_path.iterdir()} == {Path(os.environ["NUMBA_CACHE_DIR"]).name, f"{PREFIX}large"}
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 
+import pytest
 from rodsight.process.machine.linear_algebra import one_thread_each
 from threadpoolctl import threadpool_info, threadpool_limits
 
@@ -32,14 +33,15 @@ def test_input_is_checked_and_forces_are_inferred_with_one_thread() -> None:
         assert hasattr(function, "__wrapped__")
 
 
-def test_the_command_loads_linear_algebra_with_one_thread_unless_the_user_chose() -> None:
+@pytest.mark.parametrize(("name", "usual"), [("OPENBLAS_NUM_THREADS", "1"), ("MIMALLOC_PURGE_DELAY", "0")])
+def test_the_command_sets_up_the_libraries_that_it_loads_unless_the_user_has(name: str, usual: str) -> None:
     code = (
         "import contextlib, os; from rodsight.cli.main import main\n"
         "with contextlib.suppress(SystemExit): main(['--version'])\n"
-        "print(os.environ['OPENBLAS_NUM_THREADS'])"
+        f"print(os.environ['{name}'])"
     )
-    for chosen, expected in (({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")):
-        environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"} | chosen
+    for chosen, expected in (({}, usual), ({name: "3"}, "3")):
+        environment = {each: value for each, value in os.environ.items() if each != name} | chosen
         found = subprocess.run(
             [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
         )  # fmt: skip

@@ -69,6 +69,20 @@ def test_every_frame_reads_back_unchanged(stored, full):
         found.frames[FRAMES]
 
 
+def test_columns_of_one_value_are_read_as_one_value(full, tmp_path):
+    shape, file = full.tracks.rotation.shape, tmp_path / "given.h5"
+    sigma = np.full(shape, 1e-5)
+    given = replace(full.tracks, sigma=sigma, zncc=np.full(shape, np.nan))
+    save_results(file, replace(full, tracks=given), ORIGIN)
+    found = load_results(file).tracks
+    for name in ("sigma", "zncc"):
+        assert getattr(found, name).strides == (0, 0), name
+        np.testing.assert_array_equal(getattr(found, name), getattr(given, name))
+    sigma[-1, -1] = 2e-5
+    save_results(file, replace(full, tracks=given), ORIGIN)
+    np.testing.assert_array_equal(load_results(file).tracks.sigma, sigma)
+
+
 def test_reading_frames_takes_the_memory_of_a_few(stored):
     found = load_results(stored)
 
@@ -116,9 +130,9 @@ def test_kinematics_of_a_frame_are_read_alone_and_are_those_of_all_frames(full, 
     save_results(tmp_path / "results.h5", few, ORIGIN)
     found, whole = load_results(tmp_path / "results.h5"), few.kinematics
     read = []
-    original = type(found.read_kinematics._stored)._part
+    original = type(found.read_kinematics._stored).part_of
     monkeypatch.setattr(
-        type(found.read_kinematics._stored), "_part",
+        type(found.read_kinematics._stored), "part_of",
         lambda self, entry, rows: read.append((entry.path, rows)) or original(self, entry, rows),
     )  # fmt: skip
     for k in range(len(few.frames)):

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from rodsight.solver.posterior import gap_series
 from rodsight.solver.posterior.gap_series import GapNoise, GapSeries, measure_gap_noise, smooth_series
 
 
@@ -59,3 +60,15 @@ def test_unknown_gaps_stay_unknown_and_affect_no_others() -> None:
     assert np.isnan(smooth[2, 0])
     assert np.isnan(smooth[:, 1]).all()
     assert np.isnan(fraction[:, 1]).all()
+
+
+def test_long_sequences_are_smoothed_alike(monkeypatch) -> None:
+    rng = np.random.default_rng(5)
+    gap = np.cumsum(rng.normal(0.0, 0.5, (60, 40)), axis=0)
+    gap[:10, :10] = gap[20:50, 5:20] = gap[59, 15:30] = gap[:, 39] = np.nan
+    for noise in (GapNoise(1.0, 0.5), GapNoise(1.0, 1e-3)):
+        short = smooth_series(gap, noise)
+        monkeypatch.setattr(gap_series, "DENSE", 0)
+        for one, other in zip(short, smooth_series(gap, noise), strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-9)
+        monkeypatch.undo()

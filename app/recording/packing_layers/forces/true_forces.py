@@ -89,7 +89,7 @@ class TruthWriter:
         )
         true = np.column_stack([truth.fn[rows], truth.ft[rows]])
         union, on_truth, on_inferred = align(key, true, inferred_key, inferred)
-        present = are_present(union, scene.tracks.present[clock.frame], scene.grains.count + scene.walls.count)
+        present = are_present(union, scene.tracks.frame(clock.frame).present[0], scene.grains.count + scene.walls.count)
         both = np.stack([on_inferred, on_truth])[:, present]
         log_difference(clock, scene, entities.TRUTH_DIFFERENCE, union[present], both[..., 0], both[..., 1])
         true_fn, inferred_fn = on_truth[:, 0], on_inferred[:, 0]
@@ -111,6 +111,6 @@ class TruthWriter:
 
     def _drawable(self, frame: int, rows: np.ndarray) -> np.ndarray:
         """Return which true contacts have both bodies in the frame; the others count as missed but cannot be drawn."""
-        n, present = self._scene.grains.count, self._scene.tracks.present[frame]
+        n, present = self._scene.grains.count, self._scene.tracks.frame(frame).present[0]
         i, j = self._truth.i[rows], self._truth.j[rows]
         return present[i] & ((j >= n) | present[np.minimum(j, n - 1)])
