@@ -14,10 +14,11 @@ from ..corrected_sequence import CorrectedSequence
 from .causes import finding
 from .data_quality import measure_data_quality
 
-# Fraction of the contacts that slide beyond noise, from which on an attraction is named: forces that only push explain
-# the noise of contacts at rest worse than forces of either sign. Sheared packings slide at .2 and more of them; under
-# a rising pressure, or nearly jammed, at less than .06, and there the attraction was named wrongly.
+# Fraction of the contacts that slide beyond noise, from which on causes are named that act where they slide: forces
+# that only push explain the noise of contacts at rest worse than forces of either sign. Sheared packings slide at .2
+# and more; under a rising pressure, or nearly jammed, at less than .06, and there causes were named wrongly.
 LEAST_SLIDING = 0.1
+NEED_SLIDING = ("friction", "wall_friction", "adhesion")
 LEAST_NAMED = 0.005  # of the mean force: a lesser drag or attraction explains nothing, whatever else was fitted with it
 
 
@@ -30,7 +31,7 @@ def examine_resistance(sequence: CorrectedSequence) -> list[Finding]:
     found = find_in_sequence(packing, snapshots, first, unit, probability, sequence.settings.workers)
     if found is None or not found.cause or (found.cause == "friction" and sequence.friction_measured):
         return []
-    if found.cause == "adhesion" and not _slides(sequence):
+    if found.cause in NEED_SLIDING and not _slides(sequence):
         return []
     named = {"base_friction": found.found.base_drag, "adhesion": found.found.attraction}
     if named.get(found.cause, 1.0) < LEAST_NAMED:
@@ -58,7 +59,7 @@ def examine_resistance(sequence: CorrectedSequence) -> list[Finding]:
 
 
 def _slides(sequence: CorrectedSequence) -> bool:
-    """Whether so many contacts slide beyond noise that they can show an attraction."""
+    """Whether so many contacts slide beyond noise that they can show what resists it."""
     quality = measure_data_quality(sequence.tracks, sequence.walls)
     return quality is not None and quality.sliding > LEAST_SLIDING
 

@@ -68,10 +68,14 @@ def test_nothing_is_reported_without_a_winner_or_where_the_friction_was_measured
     assert len(examine(measured, monkeypatch, "wall_friction")) == 1
 
 
-def test_an_attraction_is_named_only_where_enough_contacts_slide(sequence, monkeypatch) -> None:
-    assert examine(sequence, monkeypatch, "adhesion", 0.05) == []
-    assert examine(sequence, monkeypatch, "adhesion", None) == []
-    assert len(examine(sequence, monkeypatch, "adhesion", 0.15)) == 1
+@pytest.mark.parametrize("cause", ["friction", "wall_friction", "adhesion"])
+def test_what_acts_where_contacts_slide_is_named_only_where_enough_do(sequence, monkeypatch, cause) -> None:
+    assert examine(sequence, monkeypatch, cause, 0.05) == []
+    assert examine(sequence, monkeypatch, cause, None) == []
+    assert len(examine(sequence, monkeypatch, cause, 0.15)) == 1
+
+
+def test_a_base_is_named_however_few_contacts_slide(sequence, monkeypatch) -> None:
     assert len(examine(sequence, monkeypatch, "base_friction", 0.05)) == 1
 
 
