@@ -36,7 +36,8 @@ def infer_forces(run: Run, inputs: Inputs, origin: Provenance, log: VerdictLog) 
     store = CheckpointStore(lambda: run.checkpoint("solving", origin.fingerprint))
     run.kernels.wait(SOLVER_KERNELS)
     try:
-        results = infer_sequence(inputs, _RunObserver(run, log), store)
+        observer = _RunObserver(run, log)
+        results = infer_sequence(inputs, observer, store)
     except UndeterminedError as error:
         raise InputError(run.experiment.file, f"key {error.key}", str(error)) from None
     if all(frame.status is FrameStatus.FAILED for frame in results.frames):
@@ -44,7 +45,9 @@ def infer_forces(run: Run, inputs: Inputs, origin: Provenance, log: VerdictLog) 
         first = results.frames[0].reason
         raise RunError(f"{run.experiment.file}: no frame could be solved; the first one: {first}{log_file}")
     release_free_memory()
-    results = replace(results, diagnosis=tuple(diagnose_solved(inputs, results, run.progress)))
+    results = replace(
+        results, diagnosis=tuple(diagnose_solved(inputs, results, run.progress, undisturbed=observer.undisturbed))
+    )
     results = store_results(run, _named(run, results), origin, log)
     store.checkpoint.clear()
     run.timings.add("solving", since)
@@ -62,8 +65,10 @@ class _RunObserver(InferenceObserver):
     def __init__(self, run: Run, log: VerdictLog) -> None:
         super().__init__(run.progress)
         self._run, self._log = run, log
+        self.undisturbed = False  # as of `diagnose`
 
     def corrected(self, sequence: CorrectedSequence) -> None:
+        self.undisturbed = sequence.undisturbed
         self._run.write_manifest(self._log)
         if self._run.watch is not None:
             self._run.watch.start(_named(self._run, sequence.unsolved_results()))

@@ -39,6 +39,12 @@ class CorrectedSequence:
     base_gravity: float = 9.81  # [m/s²] onto the base
     noise_remark: str = ""  # where the measured noise contradicts the stated one
     lens: CameraDistortion | None = None  # None: not sought
+    jumping: bool = False  # whether poses that jump were taken out
+
+    @property
+    def undisturbed(self) -> bool:
+        """Whether neither a distortion of the camera nor jumping poses were found."""
+        return self.lens is None and not self.jumping
 
     def with_tracks(self, tracks: Tracks) -> CorrectedSequence:
         """The sequence of the same rods with other positions and radii."""

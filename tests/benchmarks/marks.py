@@ -46,9 +46,11 @@ class _Marks(InferenceObserver):
 
     def __init__(self) -> None:
         super().__init__()
+        self.undisturbed = False
         self.at = [_now()]
 
     def corrected(self, sequence: CorrectedSequence) -> None:
+        self.undisturbed = sequence.undisturbed
         self.at.append(_now())
 
     def solved(self, frame: SolvedFrame) -> None:
@@ -69,7 +71,7 @@ def measure(folder: Path, workers: int, frames: FrameRange) -> dict[str, Any]:
         marks, store = _Marks(), CheckpointStore(lambda: run.checkpoint("solving", "marks"))
         results = infer_sequence(inputs, marks, store)
         marks.at.append(_now())
-        diagnosing = time_once(lambda: diagnose_solved(inputs, results))
+        diagnosing = time_once(lambda: diagnose_solved(inputs, results, undisturbed=marks.undisturbed))
         origin = Provenance("marks", folder.name, frames, {})
         storing = time_once(lambda: save_results(Path(out) / "results.h5", results, origin))
         parts = np.diff(np.array(marks.at), axis=0)

@@ -128,7 +128,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         packing, tracks, walls, seen,
         settings.for_overlap(overlap), inputs.verdicts, calibration, tuning, boundary, failed, of_walls,
         inputs.material.friction_measured, inputs.material.base_gravity, "; ".join(each for each in remarks if each),
-        lens,
+        lens, bool(outlier_remark),
     )  # fmt: skip
     return corrected if as_given or nothing_seen or tuning is not None else correct_soft_grains(corrected)
 

@@ -36,7 +36,7 @@ from .direct_tests import (
 from .distortion import undistorted
 from .resistance import examine_resistance
 from .rivals import rivals_of
-from .trial import SETTLED, TRIAL_PHOTOGRAPHS, Trial, select_window, solve_trial, trial_score
+from .trial import TRIAL_PHOTOGRAPHS, Trial, select_window, solve_trial, trial_score
 
 # Rise of arctanh r that a rival must reach over the given input, and over all other causes. On correct input, and where
 # the model lacks physics that no rival has, the highest rise was 0.13 (seed 40, six scenarios).
@@ -58,6 +58,7 @@ def diagnose(
     *,
     first: int = 0,
     sliding: bool = True,
+    undisturbed: bool = False,
 ) -> list[Finding]:
     """Find causes for what contradicts the forces.
 
@@ -73,6 +74,8 @@ def diagnose(
         First of the photographs on which rivals are compared.
     sliding : bool
         Whether to examine what resists the sliding.
+    undisturbed : bool
+        Whether a run found neither a distortion of the camera nor jumping poses, so that neither is sought again.
 
     Returns
     -------
@@ -82,12 +85,12 @@ def diagnose(
     walls, failed = complete_walls(inputs.tracks, inputs.walls)
     if len(failed) == inputs.tracks.frame_count:
         return []
-    tracks, walls, camera = undistorted(inputs, walls, failed)
+    tracks, walls, camera = undistorted(inputs, walls, failed, camera=not undisturbed)
     found = [*examine_rotations(tracks, walls), *examine_order(tracks)]
     found += examine_walls(tracks, walls) or examine_wall_times(tracks, walls) or examine_wall_places(tracks, walls)
     found += examine_sizes(tracks, walls)
     found += examine_inertia(tracks, walls, inputs.material)
-    impossible = find_impossible_poses(tracks, walls)
+    impossible = np.zeros(tracks.status.shape, np.bool_) if undisturbed else find_impossible_poses(tracks, walls)
     poses = examine_poses(tracks, impossible)
     if not found and sliding and inputs.tracks.grain_count >= LEAST_GRAINS:
         found = _examine_sliding(inputs, first)
@@ -117,7 +120,9 @@ def _compare_rivals(inputs: Inputs, trial: Trial, progress: Progress, first: int
 
 
 @one_thread_each
-def diagnose_solved(inputs: Inputs, results: Results, progress: Progress = no_progress) -> list[Finding]:
+def diagnose_solved(
+    inputs: Inputs, results: Results, progress: Progress = no_progress, *, undisturbed: bool = False
+) -> list[Finding]:
     """Diagnose a solved test, on the photographs whose forces are expected to be worst.
 
     Parameters
@@ -127,23 +132,26 @@ def diagnose_solved(inputs: Inputs, results: Results, progress: Progress = no_pr
     results : Results
     progress : callable
         Called after every rival.
+    undisturbed : bool
+        As of `diagnose`.
 
     Returns
     -------
     list of Finding
-        Rivals are compared only where some photographs that a trial judges have an expected r below DOUBTFUL: the
-        first one, to which no motion leads, is no reason.
+        Rivals are compared only where some photographs have an expected r below DOUBTFUL. The first one, to which no
+        motion leads, and which no trial judges, is no reason.
     """
     check = results.friction_check
     slides = check is None or not check.agrees or not float(np.nanmin(check.gap, initial=np.inf)) < DOUBTFUL_GAP
     expected = np.array([frame.expected_correlation for frame in results.frames])
     window = min(TRIAL_PHOTOGRAPHS, len(expected))
-    judged = expected[min(SETTLED, window - 1) :]
-    mean = np.array([_mean(judged[k : k + max(window - SETTLED, 1)]) for k in range(len(expected) - window + 1)])
+    expected[0] = np.nan
+    mean = np.array([_mean(expected[k : k + window]) for k in range(len(expected) - window + 1)])
     if np.isfinite(mean).any() and np.nanmin(mean) < DOUBTFUL:
         first = int(np.nanargmin(mean))
-        return diagnose(inputs, solve_trial(inputs, first=first), progress, first=first)
-    return diagnose(inputs, None, sliding=slides)
+        trial = solve_trial(inputs, first=first)
+        return diagnose(inputs, trial, progress, first=first, undisturbed=undisturbed)
+    return diagnose(inputs, None, sliding=slides, undisturbed=undisturbed)
 
 
 def _examine_sliding(inputs: Inputs, first: int) -> list[Finding]:

@@ -13,13 +13,18 @@ from ..inputs import Inputs
 from .causes import finding
 
 
-def undistorted(inputs: Inputs, walls: WallTracks, failed: Collection[int]) -> tuple[Tracks, WallTracks, list[Finding]]:
-    """Return tracks and walls as a run corrects them for exchanged sizes and the camera, and what it corrects."""
+def undistorted(
+    inputs: Inputs, walls: WallTracks, failed: Collection[int], *, camera: bool = True
+) -> tuple[Tracks, WallTracks, list[Finding]]:
+    """Return tracks and walls as a run corrects them for exchanged sizes and the camera, and what it corrects.
+
+    camera: False: its distortion was sought, and there is none.
+    """
     settings, tracks, exchanged = inputs.settings, inputs.tracks, ""
     if settings.calibration is not None:
         tracks, exchanged = correct_exchanged_sizes(tracks)
     named = [finding("exchanged_sizes", exchanged)] if exchanged else []
-    if settings.boundary is None or not settings.boundary.camera or not walls.count:
+    if not camera or settings.boundary is None or not settings.boundary.camera or not walls.count:
         return tracks, walls, named
     tracks, walls, _, found = correct_camera(
         inputs.material, tracks, walls, failed, radii_known=settings.radii_are_known
