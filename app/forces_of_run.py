@@ -19,6 +19,7 @@ from .results.hdf5.store import Provenance, load_results, save_results
 from .results.results import Results
 from .run_folder import FAILURES, RESULTS, SUMMARY, Run
 from .solver.frame_forces import FrameStatus
+from .solver.posterior.candidate_gaps import forget_candidate_gaps
 from .verdicts.log import VerdictLog
 
 
@@ -50,6 +51,7 @@ def infer_forces(run: Run, inputs: Inputs, origin: Provenance, log: VerdictLog) 
     )
     results = store_results(run, _named(run, results), origin, log)
     store.checkpoint.clear()
+    forget_candidate_gaps()
     run.timings.add("solving", since)
     return results
 

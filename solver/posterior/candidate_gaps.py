@@ -65,6 +65,11 @@ def find_candidate_gaps(packing: Packing, snapshots: Sequence[Snapshot], reach: 
     return found
 
 
+def forget_candidate_gaps() -> None:
+    """Release the cached result, which is three times as long as the tracks."""
+    _cache.clear()
+
+
 def _hash_input(packing: Packing, snapshots: Sequence[Snapshot], reach: float) -> bytes:
     """Hash everything that the gaps follow from."""
     digest, grains = blake2b(digest_size=16), packing.grains

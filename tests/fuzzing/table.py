@@ -35,8 +35,9 @@ _HEAD = """# Robustness, counted
 Counts of the last runs of `pytest -m slow tests/fuzzing`, for corrupted inputs of `python -m tests.fuzzing --pieces`;
 `python -m tests.fuzzing` prints the table and writes this page. A full run has at least 10 000 corrupted inputs, 100
 kills, 40 faults, 800 requests of each server and 9600 of the page itself, 1000 photographs and a recording of 10 000.
-Failures are corrected after they were counted, and counted again by the next run. [Threats](threats.md) lists the
-attacks.
+Failures are corrected after they were counted, and counted again by the next run; inputs that failed once, such as
+times of 1e17 s or an experiment file with a hole of 3 GB, are repeated one by one by `test_earlier_failures`.
+[Threats](threats.md) lists the attacks.
 
 """
 

@@ -109,3 +109,24 @@ def test_devices_and_pipes_are_refused(originals, tmp_path):
         ended = attempt(arguments)
         assert find_problem(ended, None, (2,)) == "", arguments
         assert "not a file" in ended.errors, arguments
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_times_that_no_calculation_holds_are_refused(originals, tmp_path, command):
+    copy, out = shutil.copytree(originals.tracked, tmp_path / "copy"), tmp_path / "out"
+    lines = (copy / "times.csv").read_text().splitlines()
+    lines[-1] = f"{lines[-1].split(',')[0]},1e17"
+    (copy / "times.csv").write_text("\n".join(lines) + "\n")
+    ended = attempt([command, str(copy), "--quiet", *(("--out", str(out), *FEW) if command == "run" else ())])
+    assert find_problem(ended, out, (2,)) == ""
+    assert "times.csv" in ended.errors
+    assert "1e17" in ended.errors
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_an_experiment_file_of_gigabytes_that_takes_no_disk_is_refused(originals, tmp_path, command):
+    copy, out = shutil.copytree(originals.tracked, tmp_path / "copy"), tmp_path / "out"
+    os.truncate(copy / "experiment.toml", 3 << 30)
+    ended = attempt([command, str(copy), "--quiet", *(("--out", str(out)) if command == "run" else ())])
+    assert find_problem(ended, out, (2,)) == ""
+    assert "has a hole" in ended.errors

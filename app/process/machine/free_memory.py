@@ -28,6 +28,10 @@ def release_free_memory() -> None:
     It keeps freed arrays as large as the largest one freed before (mallopt(3), M_MMAP_THRESHOLD), so that the greatest
     memory of a run would grow with the tables that were read at its beginning.
     """
+    hdf5 = sys.modules.get("h5py")
+    if hdf5 is not None:
+        with suppress(OSError, AttributeError), hdf5.h5.phil:  # the lock around all calls of its library
+            ctypes.CDLL(hdf5.h5.__file__).H5garbage_collect()  # which its module is linked with
     arrow = sys.modules.get("pyarrow")
     if arrow is not None:
         arrow.default_memory_pool().release_unused()

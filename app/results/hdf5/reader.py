@@ -42,6 +42,7 @@ BLOCK = 64  # frames whose statistics are read, or whose numbers of sweeps are c
 OF_POSES = ("frame", "grain")  # dimensions of columns that are often one value, such as a given precision
 KEPT = ("kept_sweep", "kept_force")  # dimensions of sweeps with stored forces
 CACHE = 1 << 16  # [bytes] of cached decompressed values per dataset
+INDEX = 1 << 16  # [bytes] of cached places of blocks, as the library counts them
 
 
 class StoredRun:
@@ -154,6 +155,7 @@ class StoredRun:
         again = copy(self)
         stream = self.file.open("rb")
         again._store = store = h5py.File(stream, "r", rdcc_nbytes=CACHE)
+        _limit_index(store)
         again._found = {}
 
         def close() -> None:
@@ -261,6 +263,14 @@ class StoredRun:
 
     def _error(self, entry: Entry, problem: str) -> InputError:
         return InputError(self.file, f"dataset {entry.path}", problem)
+
+
+def _limit_index(store: h5py.File) -> None:
+    """Limit what the library keeps of the places of blocks, which takes ten times the memory that it counts."""
+    settings = store.id.get_mdc_config()
+    settings.set_initial_size = True
+    settings.initial_size = settings.min_size = settings.max_size = INDEX
+    store.id.set_mdc_config(settings)
 
 
 def _by_path(*paths: str) -> list[Entry]:
