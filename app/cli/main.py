@@ -83,7 +83,8 @@ def _run(arguments: list[str]) -> int:
 
 def _report(sentence: str, status: int) -> int:
     with suppress(OSError):  # standard error is closed
-        print(f"rodsight: {sentence}", file=sys.stderr, flush=True)
+        named = sentence if sentence.startswith("rodsight") else f"rodsight: {sentence}"
+        print(named, file=sys.stderr, flush=True)
     return status
 
 

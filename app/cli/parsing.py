@@ -53,7 +53,11 @@ def _error(arguments: Sequence[str], box: str) -> InputError:
     if found := _VALUE.search(text):
         return InputError(command, f"{found[1]} {found[2]}", f"is not a value of this option; see {command} --help")
     if found := _MISSING.search(text):
-        name = (found[1] or found[2]).upper()
+        name = found[1] or found[2]
+        if name.startswith("--"):
+            state = "needs a value" if name in arguments else "is missing"
+            return InputError(command, name, f"{state}; see {command} --help")
+        name = name.upper()
         return InputError(command, "KIND" if name.startswith("{") else name, f"is missing; see {command} --help")
     if found := _UNRECOGNISED.search(text):
         return InputError(command, found[1], f"is one argument too many; see {command} --help")

@@ -18,14 +18,24 @@ def results_file(path: Path) -> Path:
     """Return results.h5 of a run's folder, or the file itself."""
     from ..run_folder import RESULTS
 
-    return path / RESULTS if path.is_dir() else path
+    return _file_of_run(path, RESULTS)
 
 
 def recording_file(path: Path) -> Path:
     """Return recording.rrd of a run's folder, or the file itself."""
     from ..run_folder import RECORDING
 
-    return path / RECORDING if path.is_dir() else path
+    return _file_of_run(path, RECORDING)
+
+
+def _file_of_run(path: Path, name: str) -> Path:
+    """Return a file of a run's folder, or the file itself. Raises InputError for the folder of an experiment."""
+    if not path.is_dir():
+        return path
+    if (path / "experiment.toml").is_file() and not (path / name).is_file():
+        run = f"runs/{path.resolve().name}"
+        raise InputError(path, "", f"is an experiment: give the folder of its run, such as {run}")
+    return path / name
 
 
 def warn_out_of_date(path: Path, console: Console | None = None) -> None:

@@ -20,8 +20,10 @@ EXPORTS = {
     **dict.fromkeys(("pdf", "svg", "figure", "plots"), "figures RESULTS"),
 }
 STORED = ("hdf5", "h5", "netcdf", "xarray")  # formats that results.h5 has already
+OPTIONS = ("-h", "--help", "--version", "--completion")  # of the program itself
 COMMANDS = {
     "gui": "open", "workbench": "open", "start": "run", "new": "init", "setup": "init", "create": "init",
+    "sample": "synth my_test", "demo": "synth my_test", "example": "synth my_test",
     "validate": "check", "plot": "export figures", "diff": "compare", "config": "settings", "manual": "docs",
     "simulate": "synth", "batch": "campaign", "watch": "run EXPERIMENT --follow", "follow": "run EXPERIMENT --follow",
 }  # fmt: skip
@@ -30,6 +32,10 @@ COMMANDS = {
 def refuse_unknown_words(arguments: Sequence[str], commands: Sequence[str]) -> None:
     """Raise InputError where the first argument is no command, or that of `export` no kind of file."""
     word = arguments[0]
+    if word.startswith("-") and word not in OPTIONS and not word.startswith("--tyro-"):
+        near = get_close_matches(word, OPTIONS, 1)
+        hint = f": did you mean `rodsight {near[0]}`?" if near else f": there are {', '.join(OPTIONS)}"
+        raise InputError("rodsight", word, f"is not an option without a command{hint}")
     if not word.startswith("-") and word not in commands:
         raise InputError("rodsight", word, f"is not a command{_hint(word, commands, COMMANDS, 'rodsight')}")
     if word != "export" or len(arguments) < 2 or arguments[1].startswith("-"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -102,7 +102,7 @@ def track_photographs(
         grains = _detect(experiment, first, scale, walls, notify)
         progress("detection", 1, 1)
     if grains.detection.count == 0:
-        raise InputError(photographs.files[0], "", "no grains were found; give them with photographs.grains")
+        raise InputError(photographs.files[0], "", f"no grains were found{_sought(section.radii, scale)}")
     tables = {DETECTIONS: _detections_table(grains)}
     missing_walls: dict[int, str] = {}
     series = Series(photographs, read_times(experiment, count)[:stop], scale)
@@ -239,6 +239,15 @@ def _detect(
     else:
         radius = detection.radius * scale.size_at(centres)
     return ReferenceGrains(np.arange(detection.count), detection, radius)
+
+
+def _sought(radii: Sequence[float], scale: Scale) -> str:
+    """Name the radii that were sought, as they are in the photograph, and what to do."""
+    pixels = ", ".join(f"{radius / scale.mean_size:.3g}" for radius in radii)
+    cure = "give them with photographs.grains"
+    if not radii:
+        return f"; {cure}"
+    return f" of the radii photographs.radii, {pixels} px at this pixel_size: correct one of both, or {cure}"
 
 
 def _cores() -> int:

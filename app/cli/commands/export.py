@@ -110,7 +110,8 @@ def export(
         if what == "video":
             message = f"{files[0]}: {1e-6 * files[0].stat().st_size:.1f} MB."
         else:
-            message = f"{files[0].parent}/: {len(files)} pictures, {files[0].name} … {files[-1].name}."
+            names = files[0].name if len(files) == 1 else f"{len(files)} pictures, {files[0].name} … {files[-1].name}"
+            message = f"{files[0].parent}/: {names}."
     elif what == "figures":
         file = results_file(source)
         files = write_run_figures(file, out, formats or ("pdf", "svg"), frame, width, figure_set or "results")

@@ -172,8 +172,9 @@ def _explain_one(file: Path | str, first: ErrorDetails) -> tuple[str, InputError
     where = f"key {name}" if name else ""
     if first["type"] == "extra_forbidden":
         other = nearest_key(ExperimentFile, name)
+        value = "" if isinstance(first["input"], dict) else f" (value {first['input']!r})"
         hint = f": did you mean {other}?" if other else ""
-        return name, InputError(file, where, f"is not known (value {first['input']!r}){hint}")
+        return name, InputError(file, where, f"is not known{value}{hint}")
     if first["type"] == "missing" and not isinstance(first["loc"][-1], int):
         return name, InputError(file, where, f"is missing{_meaning(name)}")
     if first["type"] == "value_error":

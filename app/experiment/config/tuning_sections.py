@@ -23,7 +23,7 @@ class MaterialSection(Section):
     """Properties common to all rods."""
 
     density: Annotated[float, between(1, 3e4)] = key("Density of the rods.", unit="kg/m³", default=RODS.density)
-    length: Annotated[float, between(1e-6, 1e3)] = key(
+    length: Annotated[float, between(1e-6, 10.0)] = key(
         "Length of the rods, which converts pressures to forces.", unit="m", default=RODS.length
     )
     friction: Annotated[float, above(0, 2)] | Literal["measured"] = key(

@@ -15,11 +15,12 @@ from ...solver.statistics.frame_statistics import FrameStatistics
 from ..look import entities
 from ..look.axes import log_texts
 from ..look.clock import Clock
-from ..look.colours import SERIES, Rgba
+from ..look.colours import MARKERS, SERIES, Rgba, style_of_series
 from ..look.printable_text import printable
 from ..look.scene import Scene
 from ..look.values import log_scalar, log_scalars
 
+MARKER_SIZE = 4.5  # [px] of the viewer, half of it
 WALLS_IN_ROW = 6  # names of walls in one line of their key
 KILO, DEGREES = 1e-3, math.degrees(1.0)
 
@@ -76,15 +77,19 @@ def log_statistics_styles(stream: rr.RecordingStream, scene: Scene) -> None:
         band = rr.SeriesLines(colors=[curve.colour] * 2, names=[curve.name] * 2, widths=[0.6] * 2)
         stream.log(curve.path + entities.BAND, band, static=True)
     walls = [printable(name) for name in scene.walls.name]
-    hues = [SERIES[row % len(SERIES)] for row in range(len(walls))]
+    styles = [style_of_series(row) for row in range(len(walls))]
+    hues, markers = [hue for hue, _ in styles], [marker for _, marker in styles]
     for path in (entities.WALL_NORMAL_FORCE, entities.WALL_TANGENTIAL_FORCE):
-        stream.log(path, rr.SeriesLines(colors=hues, names=walls, widths=[2.0] * len(walls)), static=True)
+        lines = rr.SeriesLines(colors=hues, names=walls, widths=[2.0] * len(walls))
+        points = rr.SeriesPoints(colors=hues, names=walls, markers=markers, marker_sizes=[MARKER_SIZE] * len(walls))
+        stream.log(path, lines, points, static=True)
     columns = min(max(len(walls), 1), WALLS_IN_ROW)
     places = [
         np.array([(row % columns + 0.5) * 600.0 / columns, 12.0 + 24.0 * (row // columns)])
         for row in range(len(walls))
     ]  # fmt: skip
-    log_texts(stream, entities.WALL_KEY, list(zip(places, walls, hues, strict=True)))
+    named = [f"{MARKERS[marker]} {name}" for marker, name in zip(markers, walls, strict=True)]
+    log_texts(stream, entities.WALL_KEY, list(zip(places, named, hues, strict=True)))
     if scene.walls.force is not None:
         pale = [(*hue[:3], 150) for hue in hues]
         for path in (entities.WALL_NORMAL_RECORDED, entities.WALL_TANGENTIAL_RECORDED):

@@ -25,8 +25,18 @@ INFERRED: Rgba = (96, 168, 255, 255)  # a rod that no photograph shows
 NEW_CONTACT: Rgba = (112, 250, 147, 255)
 ADDED: Rgba = (196, 130, 255, 255)  # by a reviewer
 FORBIDDEN: Rgba = (255, 214, 80, 255)  # by a reviewer
-# Curves: CIE76 differences of 33 and more under all kinds of colour blindness, steps of 13 in lightness for grey.
-SERIES: tuple[Rgba, ...] = ((216, 198, 65, 255), (28, 122, 250, 255), (155, 255, 180, 255), (229, 129, 176, 255))
+# Curves: CIE76 differences of 28 and more under all kinds of colour blindness; of the first four, steps of 13 in
+# lightness for grey. Where more than four are drawn together, MARKERS distinguish them in grey.
+SERIES: tuple[Rgba, ...] = (
+    (216, 198, 65, 255), (28, 122, 250, 255), (155, 255, 180, 255), (229, 129, 176, 255),
+    (180, 165, 255, 255), (180, 60, 75, 255), (105, 90, 165, 255), (210, 0, 0, 255),
+)  # fmt: skip
+# Shapes of Rerun for the points of a curve, each with the characters that stand for it in a key. There are no more
+# colours than shapes, and the numbers of both have no common divisor: a pair of both repeats after 72 curves.
+MARKERS = {
+    "circle": "o", "square": "[]", "diamond": "<>", "cross": "x", "up": "^", "plus": "+", "down": "v", "asterisk": "*",
+    "left": "<",
+}  # fmt: skip
 
 # Signed quantities: lightness is monotonic, so that less and more differ without hue.
 # Overlap cream, touching orange, open blue.
@@ -41,6 +51,11 @@ _PROBABILITY_PATH = ((0.93, 0.13, 103.0), (0.81, 0.12, 70.0), (0.67, 0.05, 10.0)
 _DIFFERENCE_PATH = (
     (0.41, 0.235, 264.0), (0.52, 0.12, 260.0), (0.62, 0.0, 0.0), (0.75, 0.08, 60.0), (0.905, 0.10, 88.0),
 )  # fmt: skip
+
+
+def style_of_series(row: int) -> tuple[Rgba, str]:
+    """Return colour and marker of a curve among any number of them."""
+    return SERIES[row % len(SERIES)], tuple(MARKERS)[row % len(MARKERS)]
 
 
 def packed(colours: NDArray[np.uint8]) -> NDArray[np.uint32]:

@@ -89,6 +89,7 @@ _TICKS = _of("Points2D", "positions", "radii", "colors", "labels", "show_labels"
 _FILM = _STRIPS | _TICKS
 _SCALAR = _of("Scalars", "scalars")
 _LINE = _of("SeriesLines", "colors", "names", "widths")
+_MARKED = _LINE | _of("SeriesPoints", "colors", "names", "markers", "marker_sizes")
 _LANE = _of("StateChange", "state") | _of("StateConfiguration", "values", "labels", "colors")
 _FORCE_VALUES = frozenset({"i", "j", "grain_a", "body_b", "fn", "ft"})
 _CONTACT_VALUES = _FORCE_VALUES | {
@@ -114,6 +115,10 @@ _FRINGE_MAPS = (
 
 def _scalar(path: str, meaning: str, when: When = When.END, condition: Condition = Condition.ALWAYS) -> Entity:
     return Entity(path, meaning, _SCALAR | _LINE, when, condition)
+
+
+def _marked(path: str, meaning: str) -> Entity:
+    return Entity(path, meaning, _SCALAR | _MARKED, When.END)
 
 
 def _maps(paths: str, legends: str, maps: tuple[tuple[str, str], ...], condition: Condition) -> Iterator[Entity]:
@@ -262,8 +267,8 @@ SCHEMA: tuple[Entity, ...] = (
     _scalar(entities.STRONG_DEVIATOR_FRACTION, "fraction of the stress deviator carried by strong contacts"),
     _scalar(entities.CHAIN_COUNT, "force chains"),
     _scalar(entities.CHAIN_GRAIN_FRACTION, "fraction of the grains that belong to a force chain"),
-    _scalar(entities.WALL_NORMAL_FORCE, "force of the packing on every wall along its outward normal [N]"),
-    _scalar(entities.WALL_TANGENTIAL_FORCE, "force of the packing on every wall along it [N]"),
+    _marked(entities.WALL_NORMAL_FORCE, "force of the packing on every wall along its outward normal [N]"),
+    _marked(entities.WALL_TANGENTIAL_FORCE, "force of the packing on every wall along it [N]"),
     _scalar(entities.WALL_NORMAL_RECORDED, "recorded normal force on every wall [N]", When.END, Condition.WALL_FORCES),
     _scalar(entities.WALL_TANGENTIAL_RECORDED, "recorded force along every wall [N]", When.END, Condition.WALL_FORCES),
     *(_scalar(path + entities.BAND, "two standard deviations below and above the curve") for path in entities.BANDED),

@@ -6,6 +6,7 @@ import { Picture, moveTo } from "/page/picture.js";
 
 const LOUPE = 172, LOUPE_TOP = 52, MAGNIFIED = 6;
 const HINT = 36; // [px] above the picture, for the hint and the layers
+const LARGE = 2200, ENLARGED = 1.5; // [px] of the stage, beyond which the page is enlarged (style.css)
 const IDLE = 300; // [ms] after which the neighbours of a picture are requested
 const MARGIN = 0.12; // [of the stage] drawn around it, so that a movement uncovers what is there already
 const SETTLED = 180; // [ms] without a movement, after which the drawing is made anew
@@ -57,10 +58,10 @@ export class Stage {
 
   resize() {
     const dense = devicePixelRatio || 1, box = this.canvas.parentElement;
-    const first = !this.canvas.width || this.boxWidth === undefined;
+    const first = !this.canvas.width || this.boxWidth === undefined, [x, y] = first ? [] : this.toPhotograph(this.boxWidth / 2, this.boxHeight / 2);
     this.boxWidth = box.clientWidth; this.boxHeight = box.clientHeight;
     this.canvas.width = Math.round(this.boxWidth * dense); this.canvas.height = Math.round(this.boxHeight * dense);
-    if (first || this.whole) this.fit();
+    if (first || this.whole) this.fit(); else this.centre(x, y); // what was in the middle stays there
     this.redraw();
   }
 
@@ -88,6 +89,9 @@ export class Stage {
 
   /** Move the view by so many screen pixels. */
   pan(dx, dy) { this.view.x -= dx / this.view.k; this.view.y -= dy / this.view.k; this.whole = false; this.shift(); }
+
+  /** How much larger texts, lines and marks are on a screen of four thousand pixels that the system does not enlarge. */
+  get enlarged() { return this.boxWidth > LARGE ? ENLARGED : 1; }
 
   get image() { return this.picture.image; } // for tests
 
@@ -138,7 +142,7 @@ export class Stage {
     c.clearRect(0, 0, wide, high);
     c.setTransform(dense * view.k, 0, 0, dense * view.k, -dense * view.k * left, -dense * view.k * top);
     this.window = [left, top, left + wide / dense / view.k, top + high / dense / view.k];
-    this.draw(c, view.k);
+    this.draw(c, view.k / this.enlarged);
     Object.assign(drawing, { view: { ...view }, left, top, stale: false });
   }
 
@@ -147,7 +151,7 @@ export class Stage {
     const { context: c, view } = this;
     c.setTransform(dense, 0, 0, dense, 0, 0);
     c.clearRect(0, 0, this.boxWidth, this.boxHeight);
-    this.inPhotograph(c, view, () => this.fixed(c, view.k));
+    this.inPhotograph(c, view, () => this.fixed(c, view.k / this.enlarged));
     if (this.loupe && this.mouse && this.picture.image) this.paintLoupe(c);
     if (this.cursor) this.paintCursor(c);
   }
@@ -165,7 +169,7 @@ export class Stage {
     c.fillStyle = "#08090b"; c.fillRect(0, 0, copy.width, copy.height);
     c.setTransform(dense, 0, 0, dense, 0, 0);
     this.window = this.visible();
-    this.inPhotograph(c, this.view, () => { this.paintPhotograph(c, this.view); this.draw(c, this.view.k); this.fixed(c, this.view.k); });
+    this.inPhotograph(c, this.view, () => { this.paintPhotograph(c, this.view); this.draw(c, this.view.k / this.enlarged); this.fixed(c, this.view.k / this.enlarged); });
     return copy;
   }
 
@@ -177,7 +181,7 @@ export class Stage {
     c.fillStyle = "#08090b"; c.fillRect(left, LOUPE_TOP, LOUPE, LOUPE);
     c.translate(left, LOUPE_TOP);
     this.window = [x - half, y - half, x + half, y + half];
-    this.inPhotograph(c, { k, x: x - half, y: y - half }, () => { this.paintPhotograph(c, { k }); this.draw(c, k); });
+    this.inPhotograph(c, { k, x: x - half, y: y - half }, () => { this.paintPhotograph(c, { k }); this.draw(c, k / this.enlarged); });
     c.strokeStyle = "#ffffffb0"; c.lineWidth = 1;
     c.beginPath(); c.moveTo(LOUPE / 2, 0); c.lineTo(LOUPE / 2, LOUPE / 2 - 6); c.moveTo(LOUPE / 2, LOUPE / 2 + 6); c.lineTo(LOUPE / 2, LOUPE);
     c.moveTo(0, LOUPE / 2); c.lineTo(LOUPE / 2 - 6, LOUPE / 2); c.moveTo(LOUPE / 2 + 6, LOUPE / 2); c.lineTo(LOUPE, LOUPE / 2); c.stroke();

@@ -347,7 +347,9 @@ class Project:
         if self.results == (folder := self.run_folder):
             return ""
         owner = self._owner(folder)
-        other = "another experiment" if owner is None else owner.parent.name
+        other: Path | str = "another experiment" if owner is None else owner.parent
+        if isinstance(other, Path) and other.is_relative_to(self.root.resolve()):
+            other = other.relative_to(self.root.resolve())
         return f"runs/{self.name} holds the run of {other}: give this experiment another name to run it."
 
     def _pattern_stamp(self, data: dict[str, Any]) -> Any:

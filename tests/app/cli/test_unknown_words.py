@@ -25,12 +25,18 @@ from tests.program import rodsight
         (("run", "x", "y"), "rodsight run: y: is one argument too many"),
         (("run",), "rodsight run: EXPERIMENT: is missing; see rodsight run --help"),
         (("study",), "rodsight study: KIND: is missing"),
+        (("run", "x", "--frames"), "rodsight run: --frames: needs a value; see rodsight run --help"),
+        (("init", "x"), "rodsight init: --photographs: is missing; see rodsight init --help"),
+        (("--verson",), "rodsight: --verson: is not an option without a command: did you mean `rodsight --version`?"),
+        (("sample",), "did you mean `rodsight synth my_test`?"),
     ],
 )
 def test_what_was_meant_is_named_in_one_line(words, hint, capsys):
     assert rodsight(*words) == 2
     error = capsys.readouterr().err
     assert hint in error
+    assert error.count("rodsight:") <= 1
+    assert "rodsight: rodsight" not in error
     assert len(error.splitlines()) == 1
     assert "class" not in error
 
@@ -38,3 +44,11 @@ def test_what_was_meant_is_named_in_one_line(words, hint, capsys):
 def test_help_with_a_command_is_the_help_of_the_command(capsys):
     assert rodsight("help", "check") == 0
     assert "rodsight check" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("words", [("view",), ("share",), ("export", "tables"), ("score",), ("export", "pictures")])
+def test_the_run_of_an_experiment_is_suggested_where_the_experiment_is_given(words, tmp_path, capsys):
+    (tmp_path / "test").mkdir()
+    (tmp_path / "test" / "experiment.toml").write_text("")
+    assert rodsight(*words, tmp_path / "test") == 2
+    assert "is an experiment: give the folder of its run, such as runs/test" in capsys.readouterr().err

@@ -182,3 +182,25 @@ def test_the_sample_is_a_click_away(tab, photographs_only):
     tab.keyboard.press("3")
     assert tab.evaluate("workbench.project.walls.length") == 4
     expect(tab.locator("#panel h1")).to_have_text("Walls")
+
+
+def test_what_is_in_the_middle_stays_there_when_the_window_gets_smaller(page: Page, solved: Path):
+    with opened(page, solved) as tab:
+        tab.set_viewport_size({"width": 1920, "height": 1080})
+        tab.locator(".tile").first.click()
+        idle(tab)
+        go(tab, "inspect")
+        tab.evaluate("workbench.stage.centre(300, 200, 6)")
+        tab.set_viewport_size({"width": 1280, "height": 720})
+        idle(tab)
+        middle = tab.evaluate("(s => s.toPhotograph(s.boxWidth / 2, s.boxHeight / 2))(workbench.stage)")
+        assert middle == pytest.approx([300, 200], abs=1.0)
+
+
+def test_review_without_results_leads_to_the_run_and_shows_no_folder(page: Page, begun: Path):
+    with opened(page, begun) as tab:
+        tab.locator(".tile").first.click()
+        idle(tab)
+        go(tab, "review")
+        expect(tab.locator("#panel")).to_contain_text("There are no contacts to review yet")
+        assert str(begun) not in tab.locator("#panel").inner_text()

@@ -33,12 +33,10 @@ export function rangeOfValues(values, { zero = false, signed = false } = {}) {
 }
 
 const WIDE = 170, TALL = 9, ROW = 58; // [px]
-const LARGE = 2200, ENLARGED = 1.5; // [px] of a stage on a screen that the system does not enlarge
 
 /** Legends of the scales, one above the other in the lower left corner. */
 export function drawLegends(app, c, k, scales) {
-  const { stage } = app, by = stage.boxWidth > LARGE ? ENLARGED : 1;
-  k /= by;
+  const { stage } = app, by = stage.enlarged;
   scales.forEach(({ words, unit = "", below = "", scale }, n) => {
     const wide = WIDE / k, tall = TALL / k, [x, y] = stage.toPhotograph(16 * by, stage.boxHeight - (36 + ROW * n) * by);
     c.fillStyle = "#0c0e12e0"; c.beginPath(); c.roundRect(x - 6 / k, y - 22 / k, wide + 12 / k, 53 / k, 8 / k); c.fill();

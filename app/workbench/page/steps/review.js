@@ -36,6 +36,7 @@ export const review = {
   tool: (app) => ({ click: (p) => pick(app, p) }),
   pairs: () => state.frame?.pairs ?? [], // for tests
   panel(app) {
+    if (app.project.run === null) return [h("p", {}, "There are no contacts to review yet: run the experiment first."), h("button", { class: "primary", onclick: () => app.goTo("run") }, "To the run")];
     if (state.error) return [h("p", {}, state.error), h("button", { class: "primary", onclick: () => app.goTo("run") }, "To the run")];
     if (!state.status) return h("p", {}, "Reading results …");
     return [
@@ -299,7 +300,7 @@ function drawLegend(app, c, k) {
   const { stage } = app, kinds = [...(settings.blind ? [["hidden", "candidate pair"]] : [["detected", "detected"], ["undetected", "not detected"]]), ["contact", "contact"], ["no contact", "no contact"], ["unsure", "unsure"]];
   c.font = `${12 / k}px system-ui, "Noto Sans", "DejaVu Sans", sans-serif`; c.textAlign = "left"; c.textBaseline = "middle";
   const widths = kinds.map(([, words]) => c.measureText(words).width + 34 / k), total = widths.reduce((a, b) => a + b, 0);
-  let [x, y] = stage.toPhotograph(14, stage.boxHeight - 22);
+  let [x, y] = stage.toPhotograph(14 * stage.enlarged, stage.boxHeight - 22 * stage.enlarged);
   c.fillStyle = "#0c0e12e0"; c.beginPath(); c.roundRect(x - 6 / k, y - 13 / k, total + 6 / k, 26 / k, 8 / k); c.fill();
   kinds.forEach(([kind, words], n) => {
     drawMark(c, k, { point: [x + 9 / k, y], normal: [1, 0] }, 24 / k, kind);

@@ -120,7 +120,7 @@ function drawLength(c, k, [a, b], metres) {
 function drawBar(app, c, k) {
   const { stage, project } = app, wide = 150 / k * project.pixel;
   const power = 10 ** Math.floor(Math.log10(wide)), metres = [5, 2, 1].map((m) => m * power).find((m) => m <= wide) ?? power;
-  const [x, y] = stage.toPhotograph(stage.boxWidth - 24, stage.boxHeight - 22);
+  const [x, y] = stage.toPhotograph(stage.boxWidth - 24 * stage.enlarged, stage.boxHeight - 22 * stage.enlarged);
   const left = x - metres / project.pixel;
   c.fillStyle = "#000a"; c.fillRect(left - 8 / k, y - 24 / k, x - left + 16 / k, 34 / k);
   c.fillStyle = "#fff"; c.fillRect(left, y, x - left, 3 / k);

@@ -10,6 +10,7 @@ from rodsight.figures.figure_style import COLOURS
 from rodsight.recording.curve_layers.settling import STATUS_COLOURS, TRACKING_COLOURS
 from rodsight.recording.look.colours import (
     ADDED,
+    BACKGROUND,
     DIFFERENCE_RAMP,
     FORBIDDEN,
     GAP_RAMP,
@@ -18,6 +19,7 @@ from rodsight.recording.look.colours import (
     PROBABILITY_RAMP,
     SERIES,
     UNCERTAINTY_RAMP,
+    style_of_series,
 )
 from rodsight.recording.packing_layers.rods_in_3d import ALUMINIUM
 from rodsight.solver.frame_forces import FrameStatus
@@ -75,8 +77,19 @@ def test_the_most_frequent_pairs_differ_in_grey(pair):
     assert cie76(*pair, "grey") >= MIN_DIFFERENCE
 
 
-def test_curves_differ_in_grey():
-    assert min(cie76(*pair, "grey") for pair in combinations(SERIES, 2)) >= STEP_IN_GREY
+def test_the_four_curves_of_most_views_differ_in_grey():
+    assert min(cie76(*pair, "grey") for pair in combinations(SERIES[:4], 2)) >= STEP_IN_GREY
+
+
+def test_at_least_eight_curves_differ_in_colour_and_all_curves_in_colour_or_marker():
+    styles = [style_of_series(row) for row in range(72)]
+    assert len({colour for colour, _ in styles[:8]}) == len({marker for _, marker in styles[:8]}) == 8
+    assert len(set(styles)) == len(styles)
+
+
+@pytest.mark.parametrize("vision", VISIONS)
+def test_curves_contrast_with_the_ground(vision):
+    assert min(cie76(colour, BACKGROUND, vision) for colour in SERIES) >= MIN_DIFFERENCE
 
 
 @pytest.mark.parametrize("status", [FrameStatus.SUSPECT, FrameStatus.REARRANGING, FrameStatus.FAILED])

@@ -1,0 +1,50 @@
+"""python -m tests.app.manual.renew_pictures: run the sample, and draw the manual's pictures of recording and figures.
+
+The pictures of the workbench, of a campaign, of OVITO and of ParaView are taken by hand, as app/docs/gallery.md states.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from PIL import Image
+from rodsight.cli.main import main
+
+from tests.program import ROOT
+
+TABS = ("Summary", "Forces", "Convergence", "Contacts", "Statistics", "Truth")
+FIGURES = ("forces", "density", "rose", "truth", "difference")
+FRAME, QUALITY = 11, 90
+
+
+def renew(target: Path = ROOT / "app/docs/pictures") -> None:
+    """Write every picture anew."""
+    with tempfile.TemporaryDirectory() as folder:
+        run = Path(folder) / "run"
+        _rodsight("run", ROOT / "sample_data/shear", "--out", run, "--quiet")
+        for tab in TABS:
+            drawn = Path(folder) / tab
+            _rodsight(
+                "export", "pictures", run, "--tab", tab, "--frames", f"{FRAME}:{FRAME + 1}", "--size", "1440x900",
+                "--out", drawn,
+            )  # fmt: skip
+            (picture,) = drawn.glob("*.png")
+            Image.open(picture).convert("RGB").save(target / f"{tab.lower()}.jpg", quality=QUALITY)
+        figures = Path(folder) / "figures"
+        _rodsight("export", "figures", run, "--frame", FRAME, "--formats", "png", "--out", figures)
+        for name in FIGURES:
+            (file,) = figures.glob(f"{name}*.png")
+            (target / f"figure_{name}.png").write_bytes(file.read_bytes())
+
+
+def _rodsight(*arguments: object) -> None:
+    try:
+        main([str(each) for each in arguments])
+    except SystemExit as end:
+        if end.code:
+            raise
+
+
+if __name__ == "__main__":
+    renew()
