@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...drawing.ramps import make_ramp
 
 Rgba = tuple[int, int, int, int]
+Marker = Literal["circle", "square", "diamond", "cross", "up", "plus", "down", "asterisk", "left"]
 
 BACKGROUND: Rgba = (13, 14, 18, 255)
 INK: Rgba = (214, 218, 226, 255)  # text and axes
@@ -33,7 +36,7 @@ SERIES: tuple[Rgba, ...] = (
 )  # fmt: skip
 # Shapes of Rerun for the points of a curve, each with the characters that stand for it in a key. There are no more
 # colours than shapes, and the numbers of both have no common divisor: a pair of both repeats after 72 curves.
-MARKERS = {
+MARKERS: dict[Marker, str] = {
     "circle": "o", "square": "[]", "diamond": "<>", "cross": "x", "up": "^", "plus": "+", "down": "v", "asterisk": "*",
     "left": "<",
 }  # fmt: skip
@@ -53,7 +56,7 @@ _DIFFERENCE_PATH = (
 )  # fmt: skip
 
 
-def style_of_series(row: int) -> tuple[Rgba, str]:
+def style_of_series(row: int) -> tuple[Rgba, Marker]:
     """Return colour and marker of a curve among any number of them."""
     return SERIES[row % len(SERIES)], tuple(MARKERS)[row % len(MARKERS)]
 
