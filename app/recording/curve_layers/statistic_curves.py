@@ -15,7 +15,7 @@ from ...solver.statistics.frame_statistics import FrameStatistics
 from ..look import entities
 from ..look.axes import log_texts
 from ..look.clock import Clock
-from ..look.colours import MARKERS, SERIES, Rgba, style_of_series
+from ..look.colours import MARKERS, SERIES, Marker, Rgba, style_of_series
 from ..look.printable_text import printable
 from ..look.scene import Scene
 from ..look.values import log_scalar, log_scalars
@@ -78,7 +78,8 @@ def log_statistics_styles(stream: rr.RecordingStream, scene: Scene) -> None:
         stream.log(curve.path + entities.BAND, band, static=True)
     walls = [printable(name) for name in scene.walls.name]
     styles = [style_of_series(row) for row in range(len(walls))]
-    hues, markers = [hue for hue, _ in styles], [marker for _, marker in styles]
+    hues: list[Rgba] = [hue for hue, _ in styles]
+    markers: list[Marker] = [marker for _, marker in styles]
     for path in (entities.WALL_NORMAL_FORCE, entities.WALL_TANGENTIAL_FORCE):
         lines = rr.SeriesLines(colors=hues, names=walls, widths=[2.0] * len(walls))
         points = rr.SeriesPoints(colors=hues, names=walls, markers=markers, marker_sizes=[MARKER_SIZE] * len(walls))

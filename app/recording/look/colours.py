@@ -58,7 +58,8 @@ _DIFFERENCE_PATH = (
 
 def style_of_series(row: int) -> tuple[Rgba, Marker]:
     """Return colour and marker of a curve among any number of them."""
-    return SERIES[row % len(SERIES)], tuple(MARKERS)[row % len(MARKERS)]
+    markers: tuple[Marker, ...] = tuple(MARKERS)
+    return SERIES[row % len(SERIES)], markers[row % len(markers)]
 
 
 def packed(colours: NDArray[np.uint8]) -> NDArray[np.uint32]:
