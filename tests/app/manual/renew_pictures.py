@@ -1,6 +1,6 @@
-"""python -m tests.app.manual.renew_pictures: run the sample, and draw the manual's pictures of recording and figures.
+"""python -m tests.app.manual.renew_pictures: run the sample, and draw the manual's pictures.
 
-The pictures of the workbench, of a campaign, of OVITO and of ParaView are taken by hand, as app/docs/gallery.md states.
+Those of a campaign, of OVITO and of ParaView are taken by hand, as app/docs/gallery.md states.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from pathlib import Path
 from PIL import Image
 from rodsight.cli.main import main
 
+from tests.app.manual.page_pictures import draw_page
 from tests.program import ROOT
 
 TABS = ("Summary", "Forces", "Convergence", "Contacts", "Statistics", "Truth")
@@ -36,6 +37,7 @@ def renew(target: Path = ROOT / "app/docs/pictures") -> None:
         for name in FIGURES:
             (file,) = figures.glob(f"{name}*.png")
             (target / f"figure_{name}.png").write_bytes(file.read_bytes())
+        draw_page(Path(folder) / "page", target, _rodsight)
 
 
 def _rodsight(*arguments: object) -> None:
