@@ -65,9 +65,11 @@ def draw_page(folder: Path, target: Path, run: Callable[..., None]) -> None:
 
 def _paint_reflection(experiment: Path) -> Array:
     """Paint a bright disc on a rod in the middle of a photograph; return the place of the rod [px]."""
-    tracks = pd.read_csv(experiment / "truth_tracks.csv").merge(pd.read_csv(experiment / "grains.csv")[["id", "radius"]])
+    radii = pd.read_csv(experiment / "grains.csv")[["id", "radius"]]
+    tracks = pd.read_csv(experiment / "truth_tracks.csv").merge(radii)
     file = sorted((experiment / "photos").iterdir())[DAZZLED]
     photograph = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
+    assert photograph is not None
     here = tracks[tracks["frame"] == DAZZLED]
     places = np.column_stack([here["x"] / PIXEL, photograph.shape[0] - 1 - here["y"] / PIXEL])
     row = int(np.hypot(*(places - 0.5 * np.array(photograph.shape[::-1])).T).argmin())
