@@ -36,8 +36,7 @@ export const review = {
   tool: (app) => ({ click: (p) => pick(app, p) }),
   pairs: () => state.frame?.pairs ?? [], // for tests
   panel(app) {
-    if (app.project.run === null) return [h("p", {}, "There are no contacts to review yet: run the experiment first."), h("button", { class: "primary", onclick: () => app.goTo("run") }, "To the run")];
-    if (state.error) return [h("p", {}, state.error), h("button", { class: "primary", onclick: () => app.goTo("run") }, "To the run")];
+    if (state.error) return [h("p", {}, app.project.run === null ? "There are no contacts to review yet: run the experiment first." : state.error), h("button", { class: "primary", onclick: () => app.goTo("run") }, "To the run")];
     if (!state.status) return h("p", {}, "Reading results …");
     return [
       cropFigure(app), pairLines(), beforeAfterOf(),
