@@ -50,9 +50,12 @@ def shown(tab: Page, **layers: dict | bool) -> np.ndarray:
         workbench.stage.redraw();
     }""", settings)  # fmt: skip
     idle(tab)
-    tab.evaluate("workbench.stage.composed()")  # which requests the motions that these layers need
-    tab.wait_for_function("import('/page/layers/rods.js').then((rods) => rods.isLoaded())")
-    png = tab.evaluate("workbench.stage.composed().toDataURL('image/png')")
+    # Drawing requests the motions that the layers need; the page may read the results anew at any time.
+    png = tab.wait_for_function("""async () => {
+        const { isLoaded } = await import("/page/layers/rods.js"), { step, stage } = workbench;
+        const picture = stage.composed(), loaded = !step.isLoaded || step.isLoaded(workbench);
+        return loaded && isLoaded() && picture.toDataURL("image/png");
+    }""", polling=100).json_value()  # fmt: skip
     return read_picture(b64decode(png.split(",")[1]))
 
 
