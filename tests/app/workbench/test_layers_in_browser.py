@@ -18,6 +18,7 @@ from tests.browser import read_picture
 pytestmark = pytest.mark.screen
 FRAME = 3  # a photograph with forces and motion; the stored run begins at photograph 2
 LEGENDS = 200  # [px] to their right
+PATIENCE = 600  # tenths of a second until what is drawn must be loaded
 BOX = [-8, 416, 236, 606]  # [px] of the photograph around the walls of the stored run
 
 
@@ -50,12 +51,16 @@ def shown(tab: Page, **layers: dict | bool) -> np.ndarray:
         workbench.stage.redraw();
     }""", settings)  # fmt: skip
     idle(tab)
-    # Drawing requests the motions that the layers need; the page may read the results anew at any time.
-    png = tab.wait_for_function("""async () => {
-        const { isLoaded } = await import("/page/layers/rods.js"), { step, stage } = workbench;
-        const picture = stage.composed(), loaded = !step.isLoaded || step.isLoaded(workbench);
-        return loaded && isLoaded() && picture.toDataURL("image/png");
-    }""", polling=100).json_value()  # fmt: skip
+    # Drawing requests the motions that the layers need; `wait_for_function` takes a promise for true.
+    for _ in range(PATIENCE):
+        png = tab.evaluate("""async () => {
+            const { isLoaded } = await import("/page/layers/rods.js"), { step, stage } = workbench;
+            const picture = stage.composed(), loaded = !step.isLoaded || step.isLoaded(workbench);
+            return loaded && isLoaded() ? picture.toDataURL("image/png") : "";
+        }""")  # fmt: skip
+        if png:
+            break
+        tab.wait_for_timeout(100.0)
     return read_picture(b64decode(png.split(",")[1]))
 
 
