@@ -51,7 +51,7 @@ def shown(tab: Page, **layers: dict | bool) -> np.ndarray:
         workbench.stage.redraw();
     }""", settings)  # fmt: skip
     idle(tab)
-    # Drawing requests the motions that the layers need; `wait_for_function` takes a promise for true.
+    # Drawing requests the motions that the layers need; `wait_for_function` awaits nothing asynchronous.
     for _ in range(PATIENCE):
         png = tab.evaluate("""async () => {
             const { isLoaded } = await import("/page/layers/rods.js"), { step, stage } = workbench;
