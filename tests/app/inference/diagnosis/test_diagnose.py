@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from rodsight.inference.diagnosis import diagnose as module
+from rodsight.inference.diagnosis import distortion
 from rodsight.inference.diagnosis.causes import CAUSES
 from rodsight.inference.diagnosis.diagnose import diagnose
 from rodsight.inference.diagnosis.rivals import rivals_of
@@ -94,3 +95,21 @@ def test_rivals_are_compared_where_photographs_after_the_first_are_doubtful(
     results = SimpleNamespace(friction_check=None, frames=frames)
     module.diagnose_solved(None, results)  # type: ignore[arg-type]
     assert begun == ([] if compared is None else [compared])
+
+
+@pytest.mark.parametrize("undisturbed", [False, True])
+def test_what_a_run_has_sought_in_vain_is_not_sought_again(monkeypatch, undisturbed):
+    sought = []
+
+    def none_found(tracks, walls):
+        sought.append("poses")
+        return np.zeros(tracks.status.shape, bool)
+
+    def as_given(material, tracks, walls, failed, *, radii_known):
+        sought.append("camera")
+        return tracks, walls, "", None
+
+    monkeypatch.setattr(module, "find_impossible_poses", none_found)
+    monkeypatch.setattr(distortion, "correct_camera", as_given)
+    assert diagnose(INPUTS, None, sliding=False, undisturbed=undisturbed) == []
+    assert sought == ([] if undisturbed else ["camera", "poses"])
