@@ -175,7 +175,7 @@ class ReviewSession:
         n = self.results.grains.count
         if i is None or j is None or i == j or min(i, j) >= n:
             raise UnknownPair(f"there is no pair {a} {b}")
-        if not all(row >= n or self.results.tracks.frame(frame).present[0][row] for row in (i, j)):
+        if not all(row >= n or self.results.tracks.present_in(frame)[row] for row in (i, j)):
             raise UnknownPair(f"a grain of the pair {a} {b} is lost in this frame")
         return self.bodies.key(i, j)
 
@@ -341,7 +341,7 @@ class ReviewSession:
     def _both_present(self, frame: int, key: int) -> bool:
         """Both bodies have a pose in the frame."""
         n = self.results.grains.count
-        present = self.results.tracks.frame(frame).present[0]
+        present = self.results.tracks.present_in(frame)
         return all(row >= n or bool(present[row]) for row in split_key(key, self.bodies.count))
 
     def _row(self, name: Body) -> int | None:

@@ -127,8 +127,7 @@ def _still_first(ends: Array, length: Array) -> list[float]:
     """The fractions 0 and 1 of a bar (f, 2, 2) [m], first the one for which it moves less along itself."""
     along = np.diff(ends, axis=1)[:, 0] / length[:, None]
     first = np.einsum("fk,fk->f", np.diff(ends[:, 0], axis=0), along[1:])
-    moved = {held: float(np.abs(first + held * np.diff(length)).sum()) for held in (0.0, 1.0)}
-    return sorted(moved, key=lambda held: moved[held])
+    return sorted((0.0, 1.0), key=lambda held: float(np.abs(first + held * np.diff(length)).sum()))
 
 
 def _surface_motion(sequence: MeasuredSequence, w: int, length: Array) -> tuple[Array, Array, Array]:

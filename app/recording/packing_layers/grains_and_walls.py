@@ -80,7 +80,7 @@ def _drive(walls: WallTracks, row: int, frame: int) -> str:
 
 def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     tracks, canvas, frame = scene.tracks, scene.canvas, clock.frame
-    present = tracks.frame(frame).present[0]
+    present = tracks.present_in(frame)
     centre = canvas.points(last_seen(tracks.position, frame))
     radius = canvas.lengths(tracks.radius)
     status = tracks.status[frame]

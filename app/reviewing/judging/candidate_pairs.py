@@ -60,7 +60,7 @@ def find_candidate_pairs(results: Results, frame: int, threshold: float | None =
         Gap threshold of the detector [m]; default: 6 standard deviations of a position.
     """
     tracks = results.tracks
-    position, present = tracks.position[frame], tracks.frame(frame).present[0]
+    position, present = tracks.position[frame], tracks.present_in(frame)
     position_sd = float(tracks.frame(frame).position_sigma[0])
     threshold = THRESHOLD_STANDARD_DEVIATIONS * position_sd if threshold is None else threshold
     walls = walls_at(results, frame)

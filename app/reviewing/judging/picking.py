@@ -40,5 +40,5 @@ def pairs_within(results: Results, frame: int, gap: float) -> Contacts:
     """Find all pairs of one frame whose gap is below a length [m]."""
     tracks = results.tracks
     return detect_contacts(
-        results.grains, tracks.position[frame], tracks.frame(frame).present[0], walls_at(results, frame), gap
+        results.grains, tracks.position[frame], tracks.present_in(frame), walls_at(results, frame), gap
     )

@@ -193,7 +193,7 @@ def _pairs_of(run: ReviewedRun, candidates: CandidatePairs, decisions: Decisions
     results, frame = run.results, candidates.frame
     yes, no = decisions.forced(frame), decisions.forbidden(frame)
     key = join_keys(candidates.key, yes, no)
-    key = key[are_present(key, results.tracks.frame(frame).present[0], candidates.contacts.body_count)]
+    key = key[are_present(key, results.tracks.present_in(frame), candidates.contacts.body_count)]
     contacts = measure_pairs(results.grains, results.tracks.position[frame], walls_at(results, frame), key)
     stratum = match_values(key, candidates.key, strata(candidates), fill=-1)
     detected = match_values(key, candidates.key, candidates.detected, fill=False)

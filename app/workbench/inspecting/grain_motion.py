@@ -69,7 +69,7 @@ def grain_motion(data: RunData, photograph: int, since: int | None, scale: Scale
         stored = data.results.kinematics_of(slice(frame, frame + 1))
     window = None if stored is None else stored.window
     start = max(frame - (window or 1), 0) if since is None else since - data.first
-    here = np.flatnonzero(tracks.frame(frame).present[0])
+    here = np.flatnonzero(tracks.present_in(frame))
     before, after = tracks.position[start], tracks.position[frame]
     values = _measured(data, start, frame) if stored is None else _stored(stored)
     moved = _pixels_moved(scale, before[here], after[here])

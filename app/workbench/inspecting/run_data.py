@@ -237,7 +237,7 @@ def frame_network(data: RunData, photograph: int, scale: Scale) -> dict[str, Any
 
 def list_rods(tracks: Tracks, frame: int, scale: Scale) -> dict[str, Any]:
     """List the rods of a frame, in pixels; lost ones are absent."""
-    here = np.flatnonzero(tracks.frame(frame).present[0])
+    here = np.flatnonzero(tracks.present_in(frame))
     place = scale.to_pixels(tracks.position[frame, here])
     pixel = np.maximum(scale.size_at(place), 1e-12)  # [m] at each rod
     return {

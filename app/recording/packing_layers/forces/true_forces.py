@@ -111,6 +111,6 @@ class TruthWriter:
 
     def _drawable(self, frame: int, rows: np.ndarray) -> np.ndarray:
         """Return which true contacts have both bodies in the frame; the others count as missed but cannot be drawn."""
-        n, present = self._scene.grains.count, self._scene.tracks.frame(frame).present[0]
+        n, present = self._scene.grains.count, self._scene.tracks.present_in(frame)
         i, j = self._truth.i[rows], self._truth.j[rows]
         return present[i] & ((j >= n) | present[np.minimum(j, n - 1)])
