@@ -42,6 +42,11 @@ def find_holes(grains: Grains, position: Array, present: NDArray[np.bool_], wall
     centre, radius, least_radius = position[seen], grains.radius[seen], _least_radius(grains.radius)
     corner = Delaunay(centre).simplices
     point = _equidistant_points(centre[corner], radius[corner])
+    # The corners of its own triangle exclude nearly all points, without a search for the nearest centre.
+    apart = np.hypot(*np.moveaxis(point[:, None] - centre[corner], 2, 0)).min(axis=1)
+    point = point[apart - radius.min() >= least_radius]  # not where Newton's method left NaN
+    if not len(point):
+        return np.empty((0, 2))
     with np.errstate(invalid="ignore"):
         inside = np.all(
             distance_from_walls(walls.endpoints[None], None if walls.side is None else walls.side[None], point[:, None])
@@ -50,7 +55,6 @@ def find_holes(grains: Grains, position: Array, present: NDArray[np.bool_], wall
         )
     point = point[inside & np.isfinite(point).all(axis=1)]
     tree = KDTree(centre)
-    # The nearest centre, quick to find, excludes nearly all points.
     point = point[np.asarray(tree.query(point)[0]) - radius.min() >= least_radius]
     if not len(point):
         return np.empty((0, 2))

@@ -49,7 +49,10 @@ def are_among(key: Keys, others: Keys) -> NDArray[np.bool_]:
 
 def join_keys(*keys: Keys) -> Keys:
     """Return the union of the sets, ascending."""
-    return np.unique(np.concatenate(keys)) if keys else np.empty(0, np.int64)
+    if not keys:
+        return np.empty(0, np.int64)
+    joined = np.sort(np.concatenate(keys), kind="stable")  # merges sets that ascend
+    return joined[np.append(True, joined[1:] != joined[:-1])[: len(joined)]]
 
 
 def common_rows(key: Keys, others: Keys) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

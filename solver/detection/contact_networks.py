@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -56,7 +57,7 @@ class PairProbability:
         return match_values(key, self.key, self.touch)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ProbabilityNetwork:
     """Pairs that probably touch at the start or end of the interval, P(touch) being linear in between.
 
@@ -67,8 +68,14 @@ class ProbabilityNetwork:
     end: PairProbability
 
     def at(self, fraction: float, grains: Grains, state: GrainMotion, walls: Walls) -> tuple[Contacts, Array | None]:
-        key = join_keys(self.start.key, self.end.key) if fraction < 1.0 else self.end.key
-        touch = (1.0 - fraction) * self.start.of(key) + fraction * self.end.of(key)
+        key, start, end = self._inside if fraction < 1.0 else (self.end.key, 0.0, self.end.touch)
+        touch = (1.0 - fraction) * start + fraction * end
         keep = (touch > LEAST) & are_present(key, state.present, grains.count + walls.count)
         contacts = measure_pairs(grains, state.position, walls, key[keep])
         return contacts, np.maximum(0.0, np.log10(SURE / touch[keep]))
+
+    @cached_property
+    def _inside(self) -> tuple[Keys, Array, Array]:
+        """Pairs of the instants before the end, and P(touch) of each at the start and at the end."""
+        key = join_keys(self.start.key, self.end.key)
+        return key, self.start.of(key), self.end.of(key)

@@ -82,6 +82,13 @@ def displacement_scale(before: Array, after: Array, sigma: Array) -> float:
     s² = ⟨(Δx_i − mean of Δx_j over the nearest neighbours j)²⟩ − noise variance; s is at least the noise and a
     millionth of the neighbours' distance. In sheared packings s is 0.6 to 1.0 of the rms sliding at the contacts.
     """
+    return _displacement_scale(before.tobytes(), after.tobytes(), sigma.tobytes())
+
+
+@lru_cache(maxsize=16)  # the intervals before a frame and after the frame before it are one
+def _displacement_scale(*arrays: bytes) -> float:
+    before, after, sigma = (np.frombuffer(each) for each in arrays)
+    before, after = before.reshape(-1, 2), after.reshape(-1, 2)
     seen = np.flatnonzero(np.isfinite(before).all(axis=1) & np.isfinite(after).all(axis=1))
     count = min(NEIGHBOURS, len(seen) - 1)
     if count < 1:

@@ -11,13 +11,15 @@ from typing import Any
 
 import h5py
 import numpy as np
+from isal import isal_zlib
 
 from ..checkpoint import flatten
 from ..results import Results
 from ..schema import DIMENSIONS, PARTS, PER_FRAME, Entry, entries
 from .frame_pieces import Columns, Shapes, measure_extents, rows_of_frame
 
-STRONGLY = ("kept_force",)  # dimensions of the largest datasets, which a third more time makes a quarter smaller
+STRONGLY = ("kept_force",)  # dimensions of the largest datasets
+STRONG, QUICK = 3, 1  # levels of compression
 MIN_COMPRESSED = 1024  # [bytes]: smaller datasets would double by the index of their compressed blocks
 BLOCK = 1 << 15  # [bytes] of a compressed block, and of the rows in memory before it is written
 TEXTS = 256  # number of texts in memory before they are written
@@ -90,7 +92,7 @@ class _BlockWriter:
 
     def _write(self, count: int) -> None:
         rows = np.concatenate(self._pending)
-        self._dataset[self._written : self._written + count] = rows[:count]
+        _write_rows(self._entry, self._dataset, self._written, rows[:count])
         self._pending, self._count = [rows[count:].copy()], len(rows) - count
         self._written += count
 
@@ -133,7 +135,26 @@ def _write_scales(store: h5py.File, shapes: Shapes, columns: Columns) -> None:
 def _write_whole(store: h5py.File, columns: Columns) -> None:
     for each in entries():
         if each.path in columns:
-            _make_dataset(store, each, columns[each.path].shape)[...] = _as_stored(each, columns[each.path])
+            rows = _as_stored(each, columns[each.path])
+            _write_rows(each, _make_dataset(store, each, rows.shape), 0, rows)
+
+
+def _write_rows(entry: Entry, dataset: h5py.Dataset, first: int, rows: np.ndarray) -> None:
+    """Write rows from a number on, which is a multiple of the rows of a block where the dataset is compressed.
+
+    A tenth of the time of HDF5's own deflate, whose form it has: blocks are shuffled and compressed before HDF5 stores
+    them.
+    """
+    chunks = dataset.chunks
+    if chunks is None:
+        dataset[slice(first, first + len(rows)) if rows.ndim else ()] = rows
+        return
+    level, size = STRONG if entry.dims == STRONGLY else QUICK, chunks[0]
+    for start in range(0, len(rows), size):
+        block = np.zeros(chunks, rows.dtype)  # the last one is stored whole, too
+        block[: len(rows) - start] = rows[start : start + size]
+        shuffled = block.reshape(-1).view(np.uint8).reshape(-1, block.itemsize).T.tobytes()
+        dataset.id.write_direct_chunk((first + start,) + (0,) * (block.ndim - 1), isal_zlib.compress(shuffled, level))
 
 
 def _write_scale(store: h5py.File, name: str, size: int, columns: Mapping[str, np.ndarray]) -> None:
@@ -165,8 +186,7 @@ def _make_dataset(store: h5py.File, entry: Entry, shape: tuple[int, ...]) -> h5p
     size = int(np.prod(shape)) * entry.dtype.itemsize
     if size >= MIN_COMPRESSED and entry.dtype.kind != "O":
         rows = max(min(BLOCK * shape[0] // size, shape[0]), 1)
-        level = 4 if entry.dims == STRONGLY else 1
-        options = {"chunks": (rows, *shape[1:]), "compression": "gzip", "compression_opts": level, "shuffle": True}
+        options = {"chunks": (rows, *shape[1:]), "compression": "gzip", "compression_opts": QUICK, "shuffle": True}
     dataset = store.create_dataset(entry.path, shape, kind, **options)
     for axis, name in enumerate(entry.dims):
         dataset.dims[axis].label = name

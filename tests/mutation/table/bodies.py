@@ -81,6 +81,7 @@ MUTANTS = [
         TESTS,
         ("SMALLEST_FRACTION = 0.97", "SMALLEST_FRACTION = 0.6"),
         ("LARGEST_FRACTION = 0.6", "LARGEST_FRACTION = 1.2"),
+        ("point = point[apart - radius.min() >= least_radius]", "point = point[apart - radius.max() >= least_radius]"),
         ("np.hypot(*(point[k] - each)) >= least_radius for", "True for"),
     ),
 ]

@@ -66,13 +66,13 @@ MUTANTS = [
         "solver/detection/contact_networks.py",
         DETECTION,
         ("np.maximum(0.0, np.log10(SURE / touch[keep]))", "np.maximum(0.0, np.log(SURE / touch[keep]))"),
-        ("(1.0 - fraction) * self.start.of(key) + fraction * self.end.of(key)", "self.end.of(key)"),
+        ("touch = (1.0 - fraction) * start + fraction * end", "touch = end + 0.0 * start"),
         (
             "keep = (touch > LEAST) & are_present(key, state.present, grains.count + walls.count)",
             "keep = touch > LEAST",
         ),
         ("SURE = 0.3", "SURE = 0.9"),
-        ("join_keys(self.start.key, self.end.key) if fraction < 1.0 else self.end.key", "self.end.key"),
+        ("key = join_keys(self.start.key, self.end.key)", "key = self.end.key"),
     ),
     *mutants_of(
         "solver/detection/precision.py",

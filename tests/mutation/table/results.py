@@ -23,6 +23,8 @@ MUTANTS = [
         STORE,
         ("self._pending, self._count = [rows[count:].copy()], len(rows) - count", "self._pending, self._count = [], 0"),
         ("self._written += count", "self._written = count"),
+        ("block[: len(rows) - start] = rows[start : start + size]", "block[: len(rows) - start] = rows[:size]"),
+        ("shuffled = block.reshape(-1).view(np.uint8).reshape(-1, block.itemsize).T", "shuffled = block"),
         ('dataset.attrs["unit"] = dataset.attrs["units"] = quantity.unit', 'dataset.attrs["unit"] = ""'),
         (
             "member.name.lower(): member.value for member in quantity.names}",

@@ -33,6 +33,13 @@ def test_missing_grain_leaves_a_hole_at_its_position():
     np.testing.assert_allclose(found[0], lattice()[1][HOLE], atol=EXACT)
 
 
+def test_a_larger_grain_elsewhere_hides_no_hole():
+    radius = np.full(81, R)
+    radius[0] = 1.2 * R
+    grains, position, walls = lattice(radius)
+    assert len(find_holes(grains, position, np.arange(81) != HOLE, walls)) == 1
+
+
 def test_pores_between_large_grains_are_no_holes():
     radius = np.full(81, R)
     radius[0] = 0.4 * R  # a rod that fits into the pores
