@@ -36,7 +36,7 @@ export class Stage {
   async show(url, width, height, beside = [], bounds = null) {
     if (width && height) { this.width = width; this.height = height; }
     this.bounds = bounds;
-    if (!url && this.fitted !== `${this.width}x${this.height}`) this.fit();
+    if (!url && !this.isFitted()) this.fit();
     if (url === this.wanted) { this.redraw(); return; }
     this.wanted = url;
     clearTimeout(this.idle);
@@ -44,7 +44,7 @@ export class Stage {
     try { if (!(await this.picture.show(url))) return; } catch (error) { this.unreadable(error.message); this.redraw(); return; } // never the picture of another one
     if (this.wanted !== url) return;
     if (url) this.idle = setTimeout(() => this.picture.foresee(beside), IDLE);
-    if (this.fitted !== `${this.width}x${this.height}`) this.fit();
+    if (!this.isFitted()) this.fit();
     this.redraw();
   }
 
@@ -61,9 +61,12 @@ export class Stage {
     const first = !this.canvas.width || this.boxWidth === undefined, [x, y] = first ? [] : this.toPhotograph(this.boxWidth / 2, this.boxHeight / 2);
     this.boxWidth = box.clientWidth; this.boxHeight = box.clientHeight;
     this.canvas.width = Math.round(this.boxWidth * dense); this.canvas.height = Math.round(this.boxHeight * dense);
-    if (first || this.whole) this.fit(); else this.centre(x, y); // what was in the middle stays there
+    if (first || this.whole || !this.isFitted()) this.fit(); else this.centre(x, y); // what was in the middle stays there
     this.redraw();
   }
+
+  /** Whether a picture of this size has been brought into view; before, no place of it is in the middle. */
+  isFitted() { return this.fitted === `${this.width}x${this.height}`; }
 
   fit(box = null) {
     if (!this.width || !this.boxWidth) return;

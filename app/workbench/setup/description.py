@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...drawing.wall_marks import wall_mark
 from ...experiment.experiment import GrainGuess
 from .circles import corner_names, discs_of
 from .edits import TABLES
@@ -30,12 +31,14 @@ def describe_walls(found: ValidationResult) -> list[dict[str, Any]]:
     plates = found.data.get("walls", {})
     circles, corners = {each.name: asdict(each) for each in discs_of(found)}, corner_names(found)
     listed = []
-    for name, line, pressure in zip(found.walls.name, ends.tolist(), found.walls.pressure.tolist(), strict=True):
-        plate = plates.get(name)
+    walls = zip(found.walls.name, ends.tolist(), found.walls.pressure.tolist(), strict=True)
+    for wall, (name, line, pressure) in enumerate(walls):
+        plate, mark = plates.get(name), wall_mark(wall)
         listed.append({
             "name": name, "line": line, "circle": circles.get(name), "corner": name in corners,
             "pressure": None if pressure != pressure else pressure,
             "ends": plate.get("ends", "auto") if isinstance(plate, dict) else "auto",
+            "colour": f"#{bytes(mark.colour).hex()}", "dash": mark.dash,
         })  # fmt: skip
     return listed
 

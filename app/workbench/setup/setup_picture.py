@@ -6,13 +6,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ...drawing.wall_marks import wall_mark
 from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
 from ...solver.bodies.wall_shapes import STRAIGHT
 from .circles import circles_of
 from .validation import ValidationResult
 
-# Distinct for the colour-blind (Okabe and Ito); blue, green, red.
+# Of classes of radii, distinct for the colour-blind (Okabe and Ito); blue, green, red.
 COLOURS = ((233, 180, 86), (0, 159, 230), (115, 158, 0), (167, 121, 204), (66, 228, 240), (0, 94, 213))
 WHITE, BLACK = (255, 255, 255), (0, 0, 0)
 LEAST = 900  # [px] of the longer side of the picture
@@ -34,9 +35,7 @@ def draw_setup(photograph: Image, found: ValidationResult) -> bytes:
             if found.walls.sides[k] != STRAIGHT:
                 continue
             words = name if np.isnan(pressure) else f"{name}: {pressure / 1e3:g} kPa"
-            _draw_wall(
-                picture, ends[k], words, COLOURS[(k + 1) % len(COLOURS)], wide, loaded=bool(pressure == pressure)
-            )
+            _draw_wall(picture, ends[k], words, wall_mark(k).colour[::-1], wide, loaded=bool(pressure == pressure))
     if found.scale is not None:
         _draw_scale(picture, found.scale.mean_size / zoom, wide)
     return cv2.imencode(".png", picture)[1].tobytes()

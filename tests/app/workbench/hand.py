@@ -19,12 +19,14 @@ def opened(page: Page, folder: Path) -> Iterator[Page]:
     page.set_viewport_size({"width": 1280, "height": 720})
     wrong: list[str] = []
     page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.goto(server.address)
-    idle(page)
-    yield page
-    server.shutdown()
-    thread.join()
-    server.close()
+    try:
+        page.goto(server.address)
+        idle(page)
+        yield page
+    finally:  # a thread that still computes when the interpreter ends aborts it, and hides why
+        server.shutdown()
+        thread.join()
+        server.close()
     assert wrong == []
 
 

@@ -197,6 +197,36 @@ def test_what_is_in_the_middle_stays_there_when_the_window_gets_smaller(page: Pa
         assert middle == pytest.approx([300, 200], abs=1.0)
 
 
+def test_a_window_that_changes_while_the_first_photograph_loads_shows_the_whole_of_it(page: Page, solved: Path):
+    with opened(page, solved) as tab:
+        waiting = []
+        tab.route("**/photograph*", lambda route: waiting.append(route))
+        tab.locator(".tile").first.click()
+        tab.wait_for_function("() => workbench.project !== null && workbench.stage.wanted")
+        tab.set_viewport_size({"width": 1100, "height": 700})
+        tab.wait_for_function("() => workbench.stage.boxWidth < 600")
+        for each in waiting:
+            each.continue_()
+        tab.unroute("**/photograph*")
+        idle(tab)
+        left, top, right, bottom = tab.evaluate("workbench.stage.visible()")
+        width, height = tab.evaluate("[workbench.project.width, workbench.project.height]")
+        assert max(left, top) < 0.0
+        assert right > width
+        assert bottom > height
+
+
+def test_every_wall_has_a_colour_of_its_own_beside_its_name(tab):
+    tab.get_by_text("The sample: simple shear").click()
+    idle(tab)
+    go(tab, "walls")
+    colours = tab.evaluate("workbench.project.walls.map((wall) => wall.colour)")
+    swatch = "(found) => found.map((each) => getComputedStyle(each).backgroundColor.match(/\\d+/g).map(Number))"
+    shown = tab.locator("#panel .card .swatch").evaluate_all(swatch)
+    assert [f"#{bytes(each).hex()}" for each in shown] == colours
+    assert len(set(colours)) == len(colours) == 4
+
+
 def test_review_without_results_leads_to_the_run_and_shows_no_folder(page: Page, begun: Path):
     with opened(page, begun) as tab:
         tab.locator(".tile").first.click()

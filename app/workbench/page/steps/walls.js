@@ -5,7 +5,6 @@ import { label } from "/page/steps/scale.js";
 import { tableField } from "/page/parts/tables.js";
 import { choice, measured, typed, unit, within } from "/page/units.js";
 
-const COLOURS = ["#56b4e9", "#e69f00", "#cc79a7", "#f0e442", "#2fbf93", "#d55e00"];
 let chosen = null, line = null, held = null, snap = true, round = null, points = []; // round: the circle that is dragged; points: of a new one, null while bars are drawn
 const drawing = { circle: false, corner: false };
 const KINDS = [["Straight bars", "draw-bars", "bars"], ["Circle", "draw-circle", "circle"], ["Corner disc", "draw-corner", "corner"]];
@@ -37,9 +36,9 @@ export const walls = {
   },
   draw(app, c, k) {
     const drawn = app.project.walls.map((wall) => (held && wall.name === held.name ? { ...wall, line: line ?? wall.line, circle: round ?? wall.circle } : wall));
-    drawn.forEach((wall, n) => (wall.circle ? drawCircle : drawWall)(app, c, k, wall, COLOURS[n % COLOURS.length]));
+    drawn.forEach((wall) => (wall.circle ? drawCircle : drawWall)(app, c, k, wall));
     for (const p of points) { c.fillStyle = "#fff"; c.beginPath(); c.arc(p[0], p[1], 5 / k, 0, 7); c.fill(); c.strokeStyle = "#000"; c.lineWidth = 1.5 / k; c.stroke(); }
-    if (line && !held?.name) drawWall(app, c, k, { name: "", line, pressure: null }, "#ffffff");
+    if (line && !held?.name) drawWall(app, c, k, { name: "", line, pressure: null, colour: "#ffffff", dash: [] });
   },
   key(app, event) {
     if (event.key === "Delete" && chosen) { app.change("delete_wall", { name: chosen }); chosen = null; return true; }
@@ -57,7 +56,7 @@ function card(app, wall, k) {
   const long = Math.hypot(wall.line[1][0] - wall.line[0][0], wall.line[1][1] - wall.line[0][1]) * app.project.pixel;
   const plate = (values) => app.change("set_plate", { name: wall.name, pressure: wall.pressure, ends: wall.ends, ...values });
   return h("div", { class: `card ${wall.name === chosen ? "here" : ""}`, id: `wall-${wall.name}`, onclick: (event) => { if (event.target.tagName === "DIV" && chosen !== wall.name) { chosen = wall.name; app.paint(); } } },
-    h("div", { class: "row" }, h("span", { class: "swatch", style: { background: COLOURS[k % COLOURS.length] } }),
+    h("div", { class: "row" }, swatch(wall),
       h("input", { value: wall.name, style: { flex: "1", fontWeight: 600 }, "aria-label": "name of the wall", id: `wall-name-${k}`, onchange: (event) => app.change("rename_wall", { name: wall.name, to: event.target.value.trim() }) }),
       h("span", { class: "soft" }, wall.circle ? `r ${measured("length", wall.circle.radius * app.project.pixel)}` : measured("length", long)),
       h("button", { class: "quiet", title: "Delete this wall", onclick: () => app.change("delete_wall", { name: wall.name }) }, "✕")),
@@ -150,13 +149,21 @@ function nearest(app, p) {
   return best && best[0] * app.stage.view.k < 14 ? best[1] : null;
 }
 
-function drawWall(app, c, k, wall, style) {
+/** A short piece of a wall's line, beside its name. */
+const swatch = ({ colour, dash: [drawn, open] }) => h("span", { class: "swatch", style: { width: "18px", background: drawn ? `repeating-linear-gradient(90deg, ${colour} 0 ${drawn / 2}px, transparent ${drawn / 2}px ${(drawn + open) / 2}px)` : colour } });
+
+/** A wall's line over a dark one; dashes tell walls of one colour apart. */
+function strokeWall(c, k, { name, colour, dash }, trace) {
+  const wide = name && name === chosen ? [7, 3.5] : [5, 2.2];
+  for (const [width, paint, gaps] of [[wide[0], "#000c", []], [wide[1], colour, dash]]) { c.strokeStyle = paint; c.lineWidth = width / k; c.setLineDash(gaps.map((each) => each / k)); c.beginPath(); trace(); c.stroke(); }
+  c.setLineDash([]);
+}
+
+function drawWall(app, c, k, wall) {
   const [a, b] = wall.line, l = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
   const n = [(b[1] - a[1]) / l, -(b[0] - a[0]) / l]; // towards the packing: y points down
-  const here = wall.name === chosen;
-  for (const [width, paint] of [[here ? 7 : 5, "#000c"], [here ? 3.5 : 2.2, style]]) {
-    c.strokeStyle = paint; c.lineWidth = width / k; c.beginPath(); c.moveTo(...a); c.lineTo(...b); c.stroke();
-  }
+  const here = wall.name === chosen, style = wall.colour;
+  strokeWall(c, k, wall, () => { c.moveTo(...a); c.lineTo(...b); });
   const loaded = wall.pressure !== null && wall.pressure !== undefined, count = loaded ? 7 : 3, size = (loaded ? 26 : 9) / k;
   for (let m = 0; m < count; m += 1) {
     const t = (m + 0.5) / count, x = a[0] + (b[0] - a[0]) * t, y = a[1] + (b[1] - a[1]) * t;
@@ -171,9 +178,9 @@ function drawWall(app, c, k, wall, style) {
   if (wall.name) label(c, k, (a[0] + b[0]) / 2 - n[0] * 44 / k, Math.min(Math.max((a[1] + b[1]) / 2 - n[1] * 44 / k, high), low), loaded ? `${wall.name} · ${measured("pressure", wall.pressure)}` : wall.name, style);
 }
 
-function drawCircle(app, c, k, wall, style) {
-  const { x, y, radius, side } = wall.circle, here = wall.name === chosen, loaded = wall.pressure !== null && wall.pressure !== undefined;
-  for (const [width, paint] of [[here ? 7 : 5, "#000c"], [here ? 3.5 : 2.2, style]]) { c.strokeStyle = paint; c.lineWidth = width / k; c.beginPath(); c.arc(x, y, radius, 0, 2 * Math.PI); c.stroke(); }
+function drawCircle(app, c, k, wall) {
+  const { x, y, radius, side } = wall.circle, here = wall.name === chosen, style = wall.colour, loaded = wall.pressure !== null && wall.pressure !== undefined;
+  strokeWall(c, k, wall, () => c.arc(x, y, radius, 0, 2 * Math.PI));
   const to = side === "in" ? -1 : 1, size = (loaded ? 26 : 9) / k;
   for (let m = 0; m < 12; m += 1) {
     const u = [Math.cos((m + 0.5) * Math.PI / 6), Math.sin((m + 0.5) * Math.PI / 6)], foot = loaded ? radius - to * size : radius, tip = loaded ? radius : radius + to * size, head = tip - to * 6 / k;

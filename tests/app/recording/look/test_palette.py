@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from rodsight.drawing.force_range import ForceRange
 from rodsight.drawing.ramps import FORCE_RAMP, FORCE_RAMP_ON_WHITE
+from rodsight.drawing.wall_marks import WALL_COLOURS, WALL_DASHES, wall_mark
 from rodsight.figures.figure_style import COLOURS
 from rodsight.recording.curve_layers.settling import STATUS_COLOURS, TRACKING_COLOURS
 from rodsight.recording.look.colours import (
@@ -28,6 +29,7 @@ from tests.app.recording.look.colour_vision import VISIONS, cie76
 
 MIN_DIFFERENCE = 25.0
 LABELLED_DIFFERENCE = 20.0  # in grey, beside a text of the same meaning
+WALL_DIFFERENCE = 23.0  # beside a name, which every wall has
 STEP_IN_GREY = 12.0  # between two curves of a view
 GROUPS = {
     "curves": SERIES,
@@ -49,6 +51,17 @@ RAMPS = {
 def test_colours_of_a_group_differ(group, vision):
     for one, other in combinations(GROUPS[group], 2):
         assert cie76(one, other, vision) >= MIN_DIFFERENCE, (one, other)
+
+
+@pytest.mark.parametrize("vision", [name for name in VISIONS if name != "grey"])
+def test_ten_walls_differ_by_colour(vision):
+    assert len(WALL_COLOURS) == 10
+    for one, other in combinations(WALL_COLOURS, 2):
+        assert cie76(one, other, vision) >= WALL_DIFFERENCE, (one, other)
+
+
+def test_thirty_walls_have_marks_of_their_own():
+    assert len({wall_mark(wall) for wall in range(30)}) == len(WALL_COLOURS) * len(WALL_DASHES) == 30
 
 
 @pytest.mark.parametrize("ramp", RAMPS)
