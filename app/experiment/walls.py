@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from difflib import get_close_matches
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,10 @@ def read_walls(experiment: Experiment, frame_count: int) -> WallTracks | None:
         endpoints = np.concatenate([endpoints, ends], axis=1)
     tables = " or ".join(name for name in (section.file, section.arcs, section.corners) if name is not None)
     for unknown in section.plates.keys() - set(names):
-        raise InputError(experiment.file, f"key walls.{unknown}", f"there is no such wall in {tables}")
+        near = get_close_matches(unknown.lower(), [each.lower() for each in names], n=1)
+        meant = [each for each in names if near and each.lower() == near[0]]
+        hint = f": write [walls.{meant[0]}]" if meant else f": there are {', '.join(names)}"
+        raise InputError(experiment.file, f"key walls.{unknown}", f"there is no such wall in {tables}{hint}")
     pressure = np.array([section.plates[n].pressure if n in section.plates else None for n in names], np.float64)
     end_kind = np.array([ENDS[section.plates[n].ends] if n in section.plates else UNSPECIFIED for n in names], np.int8)
     load = None

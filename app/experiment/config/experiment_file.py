@@ -13,6 +13,7 @@ from pydantic_core import ErrorDetails
 
 from ...process.errors import InputError
 from ..reading.input_files import InputFiles
+from .corrections import correct_value, explain_line
 from .input_sections import BoundarySection, GivenTracks, PhotographsSection, WallsSection
 from .keys import Key, find_key, nearest_key
 from .section import Section, key
@@ -66,13 +67,15 @@ class ExperimentFile(InferenceSections, InputSections):
 def load_config(file: Path, settings: Sequence[str] = (), inputs: InputFiles | None = None) -> ExperimentFile:
     """Read an experiment file and override it by KEY=VALUE settings. Raises InputError with file, key and value."""
     try:
-        data = tomllib.loads((InputFiles() if inputs is None else inputs).read(file, text=True).decode("utf-8"))
+        text = (InputFiles() if inputs is None else inputs).read(file, text=True).decode("utf-8")
     except FileNotFoundError:
         raise InputError(file, "", "there is no such file") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(file, "", f"cannot be read ({error})") from None
+    try:
+        data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # ValueError also for a number of thousands of digits
-        raise InputError(file, "", f"is not TOML: {error}") from None
+        raise InputError(file, "", f"is not TOML: {explain_line(text, error, _unit_of)}") from None
     return _validated(ExperimentFile, file, data, settings)
 
 
@@ -158,12 +161,19 @@ def find_wrong_values(file: Path, data: dict[str, Any], keys: Collection[str]) -
     return []
 
 
+def _unit_of(name: str) -> str:
+    found = find_key(ExperimentFile, name)
+    return "" if found is None else found.unit
+
+
 def _first_word(error: InputError) -> str:
     return error.problem.partition(" ")[0]
 
 
 def _explain(file: Path | str, error: ValidationError) -> InputError:
-    return _explain_one(file, error.errors()[0])[1]
+    errors = error.errors()
+    misspelt = (each for each in errors if each["type"] == "extra_forbidden")  # why another key seems to be missing
+    return _explain_one(file, next(misspelt, errors[0]))[1]
 
 
 def _explain_one(file: Path | str, first: ErrorDetails) -> tuple[str, InputError]:
@@ -171,6 +181,11 @@ def _explain_one(file: Path | str, first: ErrorDetails) -> tuple[str, InputError
     name = ".".join(str(part) for part in first["loc"] if str(part) not in _INNER and "[" not in str(part))
     where = f"key {name}" if name else ""
     if first["type"] == "extra_forbidden":
+        if name.count(".") == 1 and name.startswith("walls.") and not isinstance(first["input"], dict):
+            line = correct_value("pressure", first["input"], "number", "Pa") or f"pressure = {first['input']!r}"
+            wall = f"is the name of a wall: write [{name}] and, below it, {line}"
+            if nearest_key(WallsSection, name.removeprefix("walls.")) is None:
+                return name, InputError(file, where, wall)
         other = nearest_key(ExperimentFile, name)
         value = "" if isinstance(first["input"], dict) else f" (value {first['input']!r})"
         hint = f": did you mean {other}?" if other else ""
@@ -178,18 +193,29 @@ def _explain_one(file: Path | str, first: ErrorDetails) -> tuple[str, InputError
     if first["type"] == "missing" and not isinstance(first["loc"][-1], int):
         return name, InputError(file, where, f"is missing{_meaning(name)}")
     if first["type"] == "value_error":
-        return name, InputError(file, where, first["msg"].removeprefix("Value error, "))
+        known, words = find_key(ExperimentFile, name), first["msg"].removeprefix("Value error, ")
+        return name, InputError(file, where, words + ("" if known is None else _correction(known, first["input"])))
     value = f"value {_shortened(first['input'])}"
     if first["type"] == "model_type":
         return name, InputError(file, where, f"{value}: is a section: write [{name}] and its keys below it")
     known = _key_of(name)
     if known is not None and (name != known.name or first["type"].endswith("_type") or first["type"] in LENGTHS):
-        return name, InputError(file, f"key {known.name}", f"{value}{_range(known.name)}{_meaning(known.name)}")
+        given = name if find_key(ExperimentFile, name.rpartition(".")[0]) is None else name.rpartition(".")[0]
+        own = given if given.count(".") == known.name.count(".") else known.name  # with the name of the wall
+        words = f"{value}{_range(known.name, own)}{_meaning(known.name)}{_correction(known, first['input'])}"
+        return name, InputError(file, f"key {own}", words)
     if first["type"] == "string_pattern_mismatch":
         words = "must begin with a letter or a digit, and hold letters, digits, spaces and . + - _ only"
         return name, InputError(file, where, f"{value}: {words}{_range(name)}{_meaning(name)}")
     expected = first["msg"].replace("Input should be", "must be").replace("a valid dictionary", "a section of keys")
-    return name, InputError(file, where, f"{value}: {expected}{_range(name)}{_meaning(name)}")
+    corrected = "" if known is None else _correction(known, first["input"])
+    return name, InputError(file, where, f"{value}: {expected}{_range(name, name)}{_meaning(name)}{corrected}")
+
+
+def _correction(known: Key, value: Any) -> str:
+    """Return what to write instead of a value, to append to an error; empty: it cannot be guessed."""
+    line = correct_value(known.name.rpartition(".")[2], value, known.kind, known.unit)
+    return "" if line is None else f": write {line}"
 
 
 def _key_of(name: str) -> Key | None:
@@ -202,10 +228,18 @@ def _shortened(value: Any) -> str:
     return text if len(text) <= MAX_QUOTED else f"{text[:MAX_QUOTED]} …"
 
 
-def _range(name: str) -> str:
-    """Return the allowed values of a key, to append to an error."""
+def _range(name: str, own: str = "") -> str:
+    """Return the allowed values of a key, to append to an error; own: its name with that of the wall."""
     found = find_key(ExperimentFile, name)
-    return "" if found is None else f"; {found.name} is a {found.kind}"
+    return "" if found is None else f"; {own or found.name} is {_with_article(found.kind)}"
+
+
+def _with_article(kind: str) -> str:
+    """Return allowed values after *is*: a number; one of some words."""
+    if kind.startswith("["):
+        each = kind.strip("[]").partition(", whole number")[0].partition(", number")[0]
+        return f"a list of {kind.count('number')}, each a {each}"
+    return kind if kind.startswith('"') else f"a {kind}"
 
 
 def _meaning(name: str) -> str:

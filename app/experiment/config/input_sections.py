@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, model_validator
@@ -293,4 +294,6 @@ class BoundarySection(Section):
     def _one_kind(self) -> BoundarySection:
         if (self.grains is None) == (self.periodic is None):
             raise ValueError("give either grains or periodic")
+        if self.grains and self.grains != OUTER and get_close_matches(self.grains.lower(), [OUTER], cutoff=0.7):
+            raise ValueError(f'grains = "{self.grains}" is neither a table nor outer: write grains = "{OUTER}"')
         return self

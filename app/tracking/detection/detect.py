@@ -77,7 +77,8 @@ class DetectionSettings:
 
     def __post_init__(self) -> None:
         if any(not radius > 3.0 for radius in self.radii):
-            raise ValueError(f"radii must exceed 3 px, not {self.radii}")
+            listed = ", ".join(f"{radius:.3g}" for radius in self.radii)
+            raise ValueError(f"are {listed} px at this pixel_size, but must exceed 3 px: correct one of both")
         if self.radius_range is not None and not 3.0 < self.radius_range[0] < self.radius_range[1]:
             raise ValueError(f"radius_range must ascend and exceed 3 px, not {self.radius_range}")
 
