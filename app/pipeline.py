@@ -116,10 +116,11 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
     if run.has(TRACKS, origin) and run.has(DETECTIONS, origin):
         run.forget("tracking", "walls", PICTURES)
         return load_tracks(run.file(TRACKS))
-    from .tracking.corrected_frames import drop_outdated_frames
-    from .tracking.stage import track_photographs, write_found_tables  # not where rods are tracked already
-
     check(run)
+    # Imported neither where rods are tracked already, nor before the photographs are known to be readable.
+    from .tracking.corrected_frames import drop_outdated_frames
+    from .tracking.stage import track_photographs, write_found_tables
+
     since = time.perf_counter()
     start, stop, step = run.frame_range(len(experiment.photographs()))
     uncorrected, of_pictures = (run.origin(each, corrected=False).fingerprint for each in (TRACKING, PHOTOGRAPHS_SHOWN))

@@ -51,7 +51,9 @@ def _error(arguments: Sequence[str], box: str) -> InputError:
         choices = sorted({*re.findall(r"'(.*?)'", found[3])} - {"None"})
         return InputError(command, f"{found[2]} {found[1]}", f"is not one of {', '.join(choices)}")
     if found := _VALUE.search(text):
-        return InputError(command, f"{found[1]} {found[2]}", f"is not a value of this option; see {command} --help")
+        right = _number_of(found[1], found[2])
+        hint = f"; see {command} --help" if right is None else f": write {found[1]} {right!r}"
+        return InputError(command, f"{found[1]} {found[2]}", f"is not a value of this option{hint}")
     if found := _MISSING.search(text):
         name = found[1] or found[2]
         if name.startswith("--"):
@@ -62,6 +64,17 @@ def _error(arguments: Sequence[str], box: str) -> InputError:
     if found := _UNRECOGNISED.search(text):
         return InputError(command, found[1], f"is one argument too many; see {command} --help")
     return InputError(command, "", text)
+
+
+def _number_of(option: str, text: str) -> float | None:
+    """Return the number that a quantity in another unit is, for an option with the name of a key; None: no such one."""
+    from ..experiment.config.corrections import read_quantity
+    from ..experiment.config.experiment_file import ExperimentFile
+    from ..experiment.config.keys import list_keys
+
+    name = option.removeprefix("--").replace("-", "_")
+    units = [each.unit for each in list_keys(ExperimentFile) if each.name.rpartition(".")[2] == name]
+    return read_quantity(text.strip("'\""), units[0]) if units else None
 
 
 def _options(command: str) -> list[str]:

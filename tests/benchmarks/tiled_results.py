@@ -18,7 +18,7 @@ from rodsight.solver.contacts.contacts import Contacts
 from rodsight.solver.frame_forces import FrameForces
 from rodsight.workbench.setup.draft import Draft
 
-ALONG, UP = 6, 3
+ALONG, UP = 7, 3
 MEGAPIXELS = 20.0
 PHOTOGRAPHS = 6
 
@@ -79,7 +79,7 @@ def tile_results(results: Results, steps: list[np.ndarray]) -> Results:
         grains=replace(grains, radius=np.tile(grains.radius, times), mass=np.tile(grains.mass, times)),
         frames=[_tile_frame(frame, steps, count) for frame in results.frames[kept]],
         statistics=list(results.statistics)[kept], calibration=None, friction_check=None, radius_tuning=None,
-        boundary=None,
+        boundary=None, read_kinematics=lambda: None,
     )  # fmt: skip
 
 

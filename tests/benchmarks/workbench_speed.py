@@ -1,6 +1,6 @@
-"""Processor time of the page and memory of its server with 5 400 rods and 20 megapixels.
+"""Processor time of the page and memory of its server with 5 250 rods (the sample) and 20 megapixels.
 
-    python -m tests.benchmarks.workbench_speed EXPERIMENT RUN [--folder DIR]     # of about 300 rods, finished
+    python -m tests.benchmarks.workbench_speed EXPERIMENT RUN [--folder DIR]     # of 250 rods or more, finished
 
 The run is tiled (tests/benchmarks/tiled_results.py). Every event is one that a user's hand causes; the page's processor
 time is that of its main thread, of all browser processes together where stated. Clock times depend on other work.

@@ -126,7 +126,11 @@ def _parse_pressures(texts: Sequence[str]) -> dict[str, float]:
                 raise ValueError
             found[wall.strip()] = float(value)
         except ValueError:
-            raise InputError("--pressure", text, "is not WALL=PASCAL, such as top=50e3") from None
+            from ...experiment.config.corrections import read_quantity
+
+            pressure = read_quantity(value, "Pa")
+            hint = f": write {wall}={pressure!r}" if wall and pressure is not None else ", such as top=50e3"
+            raise InputError("--pressure", text, f"is not WALL=PASCAL{hint}") from None
     return found
 
 

@@ -65,12 +65,8 @@ def correct_value(name: str, value: Any, kind: str, unit: str) -> str | None:
         return correct_value(name, value[0], kind, unit) or f"{name} = {value[0]!r}"
     number = read_quantity(value, unit) if isinstance(value, str) else value
     if kind.startswith("list of number"):
-        parts = re.split(r"[,;]\s+", value) if isinstance(value, str) else [value]
-        last = re.search(r"[^\d\s.,]+$", parts[-1]) if isinstance(value, str) else None
-        own = last[0] if last else ""  # 7, 8, 11 mm
-        numbers = [read_quantity(e if e.endswith(own) else e + own, unit) if isinstance(e, str) else e for e in parts]
-        if all(isinstance(each, float | int) for each in numbers):
-            return f"{name} = [{', '.join(f'{each!r}' for each in numbers)}]"
+        numbers = _read_list(value, unit)
+        return None if numbers is None else f"{name} = [{', '.join(f'{each!r}' for each in numbers)}]"
     if kind.startswith("number") and isinstance(value, str) and number is not None:
         return f"{name} = {number!r}"
     if kind == "text" and name == "name" and isinstance(value, int | float):
@@ -78,8 +74,21 @@ def correct_value(name: str, value: Any, kind: str, unit: str) -> str | None:
     return None
 
 
+def _read_list(value: Any, unit: str) -> list[float] | None:
+    """Return the numbers of a list that is written as a text, perhaps with one unit at its end, or as one number."""
+    parts = re.split(r"[,;]\s+", value) if isinstance(value, str) else [value]
+    end = re.search(r"[^\d\s.,]+$", parts[-1]) if isinstance(parts[-1], str) else None
+    own = "" if end is None else end[0]  # 7, 8, 11 mm
+    numbers = [
+        read_quantity(each if each.endswith(own) else each + own, unit) if isinstance(each, str) else each
+        for each in parts
+    ]
+    known: list[float] = [each for each in numbers if isinstance(each, float | int)]
+    return known if len(known) == len(parts) else None
+
+
 def explain_line(text: str, error: ValueError | RecursionError, unit_of: Callable[[str], str]) -> str:
-    """Say what is wrong with a text that is not TOML, with its line and what to write instead.
+    """Describe the fault of a text that is not TOML, with its line and what to write instead.
 
     Parameters
     ----------

@@ -35,7 +35,8 @@ def draw_setup(photograph: Image, found: ValidationResult) -> bytes:
             if found.walls.sides[k] != STRAIGHT:
                 continue
             words = name if np.isnan(pressure) else f"{name}: {pressure / 1e3:g} kPa"
-            _draw_wall(picture, ends[k], words, wall_mark(k).colour[::-1], wide, loaded=bool(pressure == pressure))
+            red, green, blue = wall_mark(k).colour
+            _draw_wall(picture, ends[k], words, (blue, green, red), wide, loaded=bool(pressure == pressure))
     if found.scale is not None:
         _draw_scale(picture, found.scale.mean_size / zoom, wide)
     return cv2.imencode(".png", picture)[1].tobytes()

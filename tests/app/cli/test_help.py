@@ -55,3 +55,19 @@ def test_the_overview_loads_no_numerics():
     code = "import sys; from rodsight.cli.command_list import overview; overview(); print('numpy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+def test_a_run_reads_its_first_photograph_before_it_imports_the_tracker(made_photographs, tmp_path):
+    code = """
+import sys
+from rodsight.cli.main import main
+from rodsight.experiment import photographs
+def first(*arguments):
+    print(sorted({"rodsight.tracking.stage", "scipy.optimize", "rerun", "pandas"} & sys.modules.keys()))
+    sys.stdout.flush()
+    __import__("os")._exit(0)
+photographs.content_of = first
+main()
+"""
+    command = [sys.executable, "-c", code, "run", made_photographs, "--out", tmp_path / "run", "--quiet"]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() == "[]"

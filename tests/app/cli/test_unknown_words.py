@@ -52,3 +52,21 @@ def test_the_run_of_an_experiment_is_suggested_where_the_experiment_is_given(wor
     (tmp_path / "test" / "experiment.toml").write_text("")
     assert rodsight(*words, tmp_path / "test") == 2
     assert "is an experiment: give the folder of its run, such as runs/test" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("flags", "written"),
+    [
+        (("--pixel-size", "0.25 mm"), "write --pixel-size 0.00025"),
+        (("--interval", "2 min"), "write --interval 120.0"),
+        (("--density", "2,7 g/cm3"), "write --density 2700.0"),
+        (("--length", "much"), "see rodsight init --help"),
+        (("--pressure", "top=50kPa"), "write top=50000.0"),
+        (("--pressure", "50kPa"), "such as top=50e3"),
+    ],
+)
+def test_an_option_with_a_unit_is_named_with_the_number_to_write(flags, written, tmp_path, capsys):
+    assert rodsight("init", tmp_path, "--photographs", "*.png", *flags) == 2
+    message = capsys.readouterr().err
+    assert written in message
+    assert message.count("\n") == 1

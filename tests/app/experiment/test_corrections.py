@@ -1,4 +1,4 @@
-"""A mistake in experiment.toml ends in one line that says what to write instead."""
+"""A mistake in experiment.toml ends in one line with what to write instead."""
 
 from __future__ import annotations
 

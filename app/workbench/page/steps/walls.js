@@ -152,7 +152,7 @@ function nearest(app, p) {
 /** A short piece of a wall's line, beside its name. */
 const swatch = ({ colour, dash: [drawn, open] }) => h("span", { class: "swatch", style: { width: "18px", background: drawn ? `repeating-linear-gradient(90deg, ${colour} 0 ${drawn / 2}px, transparent ${drawn / 2}px ${(drawn + open) / 2}px)` : colour } });
 
-/** A wall's line over a dark one; dashes tell walls of one colour apart. */
+/** A wall's line over a dark one; walls of one colour differ by their dashes. */
 function strokeWall(c, k, { name, colour, dash }, trace) {
   const wide = name && name === chosen ? [7, 3.5] : [5, 2.2];
   for (const [width, paint, gaps] of [[wide[0], "#000c", []], [wide[1], colour, dash]]) { c.strokeStyle = paint; c.lineWidth = width / k; c.setLineDash(gaps.map((each) => each / k)); c.beginPath(); trace(); c.stroke(); }
