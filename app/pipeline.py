@@ -28,7 +28,7 @@ from .experiment.walls import read_walls
 from .out_of_date import out_of_date
 from .process.atomic import write_atomically
 from .process.errors import InputError
-from .process.machine.free_memory import release_free_memory
+from .process.machine.free_memory import release_free_memory, return_large_blocks
 from .process.machine.linear_algebra import one_thread_each
 from .process.sources import hash_of_code
 from .process.stages import EFFECTS, FORCES, PHOTOGRAPHS_SHOWN, TRACKING
@@ -56,6 +56,7 @@ def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
     """Read and check all input without computing. Returns given tracks, and the walls."""
     experiment = run.experiment
     if experiment.config.tracks is not None:
+        return_large_blocks()  # tables would leave holes in the memory of all later stages
         tracks = read_tracks(experiment)
         walls = read_walls(experiment, tracks.frame_count)
         tracks = apply_boundary(experiment, tracks, walls)
@@ -267,6 +268,7 @@ def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:
     """Infer the forces of the sequence as it was given, and store them."""
     tracks, walls = track(run)
     assert walls is not None
+    return_large_blocks()  # not before photographs are tracked, which would take longer
     from .forces_of_run import infer_forces  # the first photograph is read before all this is imported
 
     return infer_forces(run, _inputs(run, log, tracks, walls), origin, log)

@@ -13,7 +13,8 @@ M_MMAP_THRESHOLD = -3  # of mallopt(3)
 def return_large_blocks() -> None:
     """Make the C library return blocks from LARGE bytes on as soon as they are freed.
 
-    A recording of 1000 photographs of 250 rods takes 15 MB less. Tracking photographs takes 4 % longer.
+    A recording of 1000 photographs of 250 rods takes 15 MB less, and 4 MB less after it was solved in the same process.
+    Tracking photographs takes 4 % longer.
     """
     if sys.platform == "linux":
         with suppress(OSError, AttributeError):  # another C library

@@ -86,7 +86,7 @@ class Recorder:
         rr.set_strict_mode(True)  # otherwise the SDK only warns about data that it cannot write
         self._stream = stream
         self._sweeps, self._kept, self._send_every, self._flush = sweeps, kept, send_every, flush
-        self._rows = RowBatches(stream)
+        self._rows = RowBatches(stream, flush)
         self._scene: Scene | None = None
         self._truth: TruthWriter | None = None
         self._film: FilmWriter | None = None
@@ -122,7 +122,7 @@ class Recorder:
     def continue_in(self, stream: rr.RecordingStream, flush: Callable[[rr.RecordingStream], None]) -> None:
         """Write the next frames into another stream, which gets the static data as well."""
         self._stream, self._flush, self._has_residual_styles = stream, flush, False
-        self._rows = RowBatches(stream)
+        self._rows = RowBatches(stream, flush)
         self._begin(stream)
         if self._plot is not None:
             self._plot.continue_in(stream)

@@ -7,7 +7,7 @@ therefore wait, in a bounded memory: the longer the run, the larger the messages
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import cast
@@ -17,9 +17,11 @@ import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
+from ...process.machine.free_memory import release_free_memory
 from ..look.clock import Moment
 
 WAITING = 24_000_000  # [bytes] of all rows, from which on those of the entity with the most are sent
+HELD = 3_000_000  # [bytes] of all rows that are sent at once, from which on the stream is flushed between entities
 PIECES = 32  # arrays that are joined to one: each takes some hundred bytes beside its values
 
 _Names = tuple["rr.ComponentDescriptor | str", ...]
@@ -90,10 +92,19 @@ class RowBatches:
 
     Rows of one entity are sent together: where several have the same time on a timeline, the viewer shows the one that
     was sent last.
+
+    Parameters
+    ----------
+    stream : RecordingStream
+        The stream.
+    flush : callable
+        Sends all logged data of the stream.
     """
 
-    def __init__(self, stream: rr.RecordingStream) -> None:
-        self._stream = stream
+    def __init__(
+        self, stream: rr.RecordingStream, flush: Callable[[rr.RecordingStream], None] = rr.RecordingStream.flush
+    ) -> None:
+        self._stream, self._flush = stream, flush
         self._moment: Moment = ()
         self._times: list[pa.Array] | None = None  # of the moment
         self._moments: dict[_Names, _Times] = {}  # of points, by timelines: most curves have one at each
@@ -132,8 +143,10 @@ class RowBatches:
         self._add(path, tuple(times), tuple(parts), [*times.values(), *parts.values()])
 
     def send(self) -> None:
-        """Send all rows and points that were added."""
+        """Send all rows and points that were added; what the stream holds of them meanwhile is bounded."""
+        held = 0
         for path in list(self._sizes):
+            held = self._flush_beyond(held + self._sizes[path])
             self._send(path)
         for (path, timelines), points in self._points.items():
             moments, at = self._moments[timelines], np.array(points.places)
@@ -141,10 +154,19 @@ class RowBatches:
                 _Joined(name, [_times(value, np.array(times)[at])])
                 for (name, value), times in zip(moments.first, moments.times, strict=True)
             ]
+            held = self._flush_beyond(held + 8 * (len(points.values) + len(at) * len(when)))
             columns = rr.Scalars.columns(scalars=np.array(points.values))
             self._stream.send_columns(path, when, columns.partition(np.array(points.counts)))
         self._points.clear()
         self._moments.clear()
+
+    def _flush_beyond(self, held: int) -> int:
+        """Flush the stream if it holds HELD bytes or more; return what it holds then [bytes]."""
+        if held < HELD:
+            return held
+        self._flush(self._stream)
+        release_free_memory()
+        return 0
 
     def _add(self, path: str, timelines: _Names, components: _Names, arrays: list[pa.Array]) -> None:
         of_path = self._rows.setdefault(path, {})

@@ -11,6 +11,7 @@ from typing import BinaryIO
 import h5py
 
 CACHE = 1 << 16  # [bytes] of uncompressed values per dataset
+CACHED_BLOCKS = 7  # slots of that cache per dataset; HDF5 2 makes 8191 of them, which take 64 kB, whatever it holds
 
 
 @contextmanager
@@ -19,7 +20,7 @@ def create_file(file: Path) -> Iterator[h5py.File]:
     with file.open("w+b", buffering=0) as target:
         stream = _ErrorKeepingStream(target)
         try:
-            with h5py.File(stream, "w", rdcc_nbytes=CACHE) as store:
+            with h5py.File(stream, "w", rdcc_nbytes=CACHE, rdcc_nslots=CACHED_BLOCKS) as store:
                 yield store
         except (OSError, RuntimeError, KeyError, ValueError):  # errors of the library that follow a failed write
             stream.check(file)

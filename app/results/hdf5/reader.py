@@ -34,6 +34,7 @@ from ..schema import (
     Entry,
     entries,
 )
+from .file_creation import CACHED_BLOCKS
 from .lazy_sequences import LazySequence
 
 CACHED_FRAMES = 4  # most recent frames
@@ -41,7 +42,7 @@ EVERY = slice(None)  # row
 BLOCK = 64  # frames whose statistics are read, or whose numbers of sweeps are checked, at once
 OF_POSES = ("frame", "grain")  # dimensions of columns that are often one value, such as a given precision
 KEPT = ("kept_sweep", "kept_force")  # dimensions of sweeps with stored forces
-CACHE = 1 << 16  # [bytes] of cached decompressed values per dataset
+CACHE = 1 << 15  # [bytes] of cached decompressed values per dataset: one block, as they are written
 INDEX = 1 << 16  # [bytes] of cached places of blocks, as the library counts them
 
 
@@ -106,7 +107,7 @@ class StoredRun:
         """Return the statistics of every frame, read a block at a time on access; all columns are checked at once."""
         for each in entries("statistics"):
             self._dataset(each)
-        return StoredStatistics(self._reopened(), self._sizes["frame"])
+        return StoredStatistics(self._reopened(cache=0), self._sizes["frame"])  # its blocks are read once each
 
     def read(self, entry: Entry) -> Any:
         """Read all values of a dataset, or its declared value where the dataset is absent."""
@@ -150,11 +151,14 @@ class StoredRun:
             raise self._error(entry, f"holds {dataset.dtype}, not text")
         return dataset
 
-    def _reopened(self) -> StoredRun:
-        """Return a copy with its own file handle, closed with the last reference; a replaced file is not read."""
+    def _reopened(self, cache: int = CACHE) -> StoredRun:
+        """Return a copy with its own file handle, closed with the last reference; a replaced file is not read.
+
+        cache: bytes of decompressed values that are kept per dataset.
+        """
         again = copy(self)
         stream = self.file.open("rb")
-        again._store = store = h5py.File(stream, "r", rdcc_nbytes=CACHE)
+        again._store = store = h5py.File(stream, "r", rdcc_nbytes=cache, rdcc_nslots=CACHED_BLOCKS)
         _limit_index(store)
         again._found = {}
 

@@ -27,7 +27,7 @@ from ..finding import Finding
 from ..manifest import MANIFEST, Manifest
 from ..results import Results
 from ..schema import DEVIATIONS, SCHEMA, SCHEMA_VERSION
-from .file_creation import create_file
+from .file_creation import CACHED_BLOCKS, create_file
 from .reader import StoredRun
 from .writer import columns_of, write_columns, write_results
 
@@ -171,7 +171,7 @@ def _opened(file: Path) -> h5py.File:
             file, "", f"differs from its entry in {MANIFEST}: it was damaged or changed; run the experiment again"
         )
     try:
-        store = h5py.File(file, "r")
+        store = h5py.File(file, "r", rdcc_nslots=CACHED_BLOCKS)
     except FileNotFoundError:
         raise InputError(file, "", "there is no such file") from None
     except OSError:

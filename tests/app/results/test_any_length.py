@@ -147,3 +147,13 @@ def test_a_cached_sequence_keeps_the_most_recent_items_within_its_capacity():
     assert some[-1] == 6
     with pytest.raises(IndexError):
         some[7]
+
+
+def test_an_open_file_holds_one_block_of_a_dataset_at_most(tmp_path):
+    save_results(tmp_path / "results.h5", make_full_results(), ORIGIN)
+    results = load_results(tmp_path / "results.h5")
+    for sequence, blocks in ((results.frames, 1), (results.statistics, 0)):
+        stored = sequence._make.args[0]
+        _, slots, values, _ = stored._store.id.get_access_plist().get_cache()
+        assert values == blocks * writer.BLOCK
+        assert slots * 8 < 256  # [bytes]: HDF5 2 makes 64 kB of places for every dataset by default

@@ -89,6 +89,22 @@ def test_the_most_rows_are_sent_once_all_are_many_and_points_wait(monkeypatch):
     assert len(stream.rows) == 4
 
 
+def test_the_stream_is_flushed_while_many_rows_and_points_are_sent(monkeypatch):
+    """What a stream holds until it is written would add to all rows that wait."""
+    stream, flushed = Sent(), []
+    batches = row_batches.RowBatches(stream, flush=lambda each: flushed.append(len(each.rows)))
+    for frame in range(10):
+        batches.begin((("frame", frame),))
+        for name in "abcd":
+            batches.add(f"/rows/{name}", [rr.TimeColumn("frame", sequence=[frame])], rr.Scalars.columns(scalars=[1.0]))
+            batches.add_point(f"/curves/{name}", [1.0])
+    monkeypatch.setattr(row_batches, "HELD", batches._sizes["/rows/a"] + 1)
+    batches.send()
+    assert len(stream.rows) == 8
+    assert flushed[0] == 1
+    assert flushed[-1] >= 5
+
+
 def test_rows_of_one_entity_are_sent_together_in_the_order_in_which_they_were_added(monkeypatch):
     """Where a row and columns of one frame set the same component, the viewer shows the one that was sent last."""
     stream = Sent()
