@@ -10,6 +10,7 @@ import json
 import os
 import subprocess
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -70,14 +71,14 @@ def peak_of_page(command: str, place: Path, count: int) -> float:
     process = subprocess.Popen([*RODSIGHT, command, str(place), "--no-browser"], stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None
-        visitor = _Visitor(process.stdout.readline().rpartition(" ")[2].strip())
         at = "." if command == "review" else "experiment"
-        visitor.request("project", at=at)
-        for frame in range(count):
-            visitor.request("network", at=at, frame=frame)
-            view = {"reviewer": "anna", "frame": frame, "blind": False}
-            visitor.request("review_status", at=at, view=view)
-            visitor.request("next_pair", at=at, view=view)
+        with closing(_Visitor(process.stdout.readline().rpartition(" ")[2].strip())) as visitor:
+            visitor.request("project", at=at)
+            for frame in range(count):
+                visitor.request("network", at=at, frame=frame)
+                view = {"reviewer": "anna", "frame": frame, "blind": False}
+                visitor.request("review_status", at=at, view=view)
+                visitor.request("next_pair", at=at, view=view)
         status = Path(f"/proc/{process.pid}/status").read_text()
         return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM")) / 1024.0
     finally:
@@ -95,6 +96,9 @@ class _Visitor:
         answer = self._connection.getresponse()
         answer.read()
         self._cookie = (answer.headers["Set-Cookie"] or "").partition(";")[0]
+
+    def close(self) -> None:
+        self._connection.close()
 
     def request(self, endpoint: str, **values: Any) -> None:
         headers = {
