@@ -57,13 +57,14 @@ def test_the_report_lists_every_run_and_draws_its_results(tmp_path):
         summary = {"friction_angle_degrees": [1.0, 2.0, 3.0], "trust": [0.5, 0.6, 0.7]}
         (tmp_path / name / "summary.json").write_text(json.dumps(summary))
     rows = [
-        {"run": name, "experiment": "x", "material.friction": 0.01 * k, "state": "done", "trust": 0.5 + 0.01 * k,
-         "trust_low": 0.4, "trust_high": 0.9}
+        {"run": name, "experiment": "x", "material.friction": f"{k}" if k else 0.0, "state": "done",
+         "trust": 0.5 + 0.01 * k, "trust_low": 0.4, "trust_high": 0.9}
         for k, name in enumerate(names)
     ]  # fmt: skip
     page = write_report(tmp_path, rows).read_text()
     assert page.count("<tr") == 41
     assert all(f'<a href="{name}/">{name}</a>' in page for name in names)
+    assert page.count('class="text"') == 80  # run and state; the values of keys are aligned, typed or not
     assert "<th>trust</th>" in page
     assert "<th>trust_low</th>" not in page  # intervals are drawn
     assert page.count("<svg") == 3

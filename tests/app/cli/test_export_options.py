@@ -42,3 +42,13 @@ def test_options_of_the_chosen_kind_are_used(run, tmp_path, capsys):
     assert not end.value.code
     assert (tmp_path / "contacts.parquet").is_file()
     assert str(tmp_path) in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("frames", "named"), [("0:1", "/: rose_000000.png."), (None, "/: 2 pictures, rose_000000")])
+def test_the_pictures_that_were_written_are_named(run, frames, named, tmp_path, capsys):
+    (run / "recording.rrd").touch()  # figures are drawn from the results
+    part = () if frames is None else ("--frames", frames)
+    with pytest.raises(SystemExit) as end:
+        main(["export", "pictures", str(run), "--out", str(tmp_path), "--figure", "rose", *part])
+    assert not end.value.code
+    assert named in capsys.readouterr().out

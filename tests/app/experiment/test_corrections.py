@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import shutil
+
 import pytest
 from rodsight.experiment.config.corrections import read_quantity
 
@@ -73,4 +76,21 @@ def test_a_mistake_of_photographs_is_named_with_what_to_write(tmp_path, capsys, 
     assert rodsight("check", tmp_path) == 2
     message = capsys.readouterr().err
     assert written in message
+    assert message.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("radii", "named"),
+    [
+        ("[0.0001]", "are 0.4 px at this pixel_size, but must exceed 3 px: correct one of both"),
+        ("[1.0]", "of the radii photographs.radii, 4e+03 px at this pixel_size: correct one of both"),
+    ],
+)
+def test_radii_that_do_not_fit_the_photograph_are_named_in_pixels(made_photographs, tmp_path, capsys, radii, named):
+    text = (made_photographs / "experiment.toml").read_text()
+    shutil.copytree(made_photographs, tmp_path / "test", ignore=shutil.ignore_patterns(".*"))
+    (tmp_path / "test/experiment.toml").write_text(re.sub(r"(?m)^radii = .*$", f"radii = {radii}", text))
+    assert rodsight("check", tmp_path / "test") == 2
+    message = capsys.readouterr().err
+    assert named in message
     assert message.count("\n") == 1

@@ -20,6 +20,7 @@ from tests.program import ROOT
 CHROMIUM = "/usr/bin/chromium"
 PIXEL, DAZZLED, FRAME, REFLECTION = 2.5e-4, 7, 11, 0.62  # [m]; photographs; radius over that of the rod
 JUDGED = 3
+REPORT = {"width": 1280, "height": 1000}
 
 
 def draw_page(folder: Path, target: Path, run: Callable[..., None]) -> None:
@@ -60,6 +61,16 @@ def draw_page(folder: Path, target: Path, run: Callable[..., None]) -> None:
                 tab.keyboard.press("c")
                 idle(tab)
             _save(tab, target / "review.jpg")
+        browser.close()
+
+
+def draw_report(page: Path, target: Path) -> None:
+    """Write the picture of a campaign's report."""
+    with sync_playwright() as engine:
+        browser = engine.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", *FLAGS])
+        tab = browser.new_page(viewport=REPORT)
+        tab.goto(page.as_uri())
+        tab.screenshot(path=target)
         browser.close()
 
 

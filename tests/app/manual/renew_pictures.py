@@ -1,17 +1,18 @@
 """python -m tests.app.manual.renew_pictures: run the sample, and draw the manual's pictures.
 
-Those of a campaign, of OVITO and of ParaView are taken by hand, as app/docs/gallery.md states.
+Those of OVITO and of ParaView are drawn by tests.app.manual.other_programs.
 """
 
 from __future__ import annotations
 
 import tempfile
+from contextlib import chdir
 from pathlib import Path
 
 from PIL import Image
 from rodsight.cli.main import main
 
-from tests.app.manual.page_pictures import draw_page
+from tests.app.manual.page_pictures import draw_page, draw_report
 from tests.program import ROOT
 
 TABS = ("Summary", "Forces", "Convergence", "Contacts", "Statistics", "Truth")
@@ -37,6 +38,9 @@ def renew(target: Path = ROOT / "app/docs/pictures") -> None:
         for name in FIGURES:
             (file,) = figures.glob(f"{name}*.png")
             (target / f"figure_{name}.png").write_bytes(file.read_bytes())
+        with chdir(folder):
+            _rodsight("campaign", ROOT / "sample_data/campaign.csv", "--out", "friction", "--quiet")
+        draw_report(Path(folder) / "friction/report.html", target / "campaign.png")
         draw_page(Path(folder) / "page", target, _rodsight)
 
 

@@ -186,6 +186,22 @@ def test_colours_of_every_layer_differ_for_everybody(tab: Page, scheme: Literal[
     assert len(set(tones)) == len(tones)  # statuses are named beside their colour
 
 
+def test_marks_of_pairs_differ_by_shape_where_their_colours_may_not(tab: Page):
+    inside = tab.evaluate("""async () => {
+        const { drawMark, COLOURS } = await import("/page/parts/verdicts.js");
+        return Object.fromEntries(Object.keys(COLOURS).map((kind) => {
+            const c = Object.assign(document.createElement("canvas"), { width: 40, height: 40 }).getContext("2d");
+            drawMark(c, 1, { point: [20, 20], normal: [1, 0] }, 50, kind);
+            const painted = (x, y) => c.getImageData(x, y, 1, 1).data[3] > 128;
+            return [kind, [painted(20, 20), painted(26, 20), painted(20, 26)]];
+        }));
+    }""")  # fmt: skip
+    assert inside.pop("contact") == [True, True, False]
+    assert inside.pop("no contact") == [True, False, True]
+    assert inside.pop("unsure") == [True, False, False]
+    assert inside == {kind: [False, False, False] for kind in ("detected", "undetected", "hidden")}
+
+
 def test_a_chosen_rod_shows_its_track(tab: Page):
     rods = tab.evaluate("workbench.step.rodsOfFrame()")
     card = tab.locator("#card")

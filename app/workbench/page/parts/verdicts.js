@@ -34,7 +34,7 @@ export const pairName = (pair) => (typeof pair.j === "number" ? `rods ${pair.i} 
 export const samePair = (a, b) => a.i === b.i && a.j === b.j;
 export const swatch = (verdict) => h("span", { class: "swatch", style: { background: COLOURS[verdict] } });
 
-/** A mark of a pair: ring; with a bond along the normal for a contact, a bar across it for no contact. */
+/** A mark of a pair: ring; with a bond along the normal for a contact, a bar across it for no contact, a dot for unsure. */
 export function drawMark(c, k, pair, radius, kind) {
   const r = Math.max(RING * radius, 5 / k), wide = Math.max((kind === "undetected" ? 0.03 : 0.05) * radius, 1.4 / k), [x, y] = pair.point;
   const path = new Path2D();
@@ -43,6 +43,7 @@ export function drawMark(c, k, pair, radius, kind) {
   if (nx || ny) { path.moveTo(x - nx * r, y - ny * r); path.lineTo(x + nx * r, y + ny * r); }
   c.strokeStyle = "#000a"; c.lineWidth = wide + 2 / k; c.stroke(path);
   c.strokeStyle = COLOURS[kind]; c.lineWidth = wide; c.stroke(path);
+  if (kind === "unsure") { c.fillStyle = COLOURS[kind]; c.beginPath(); c.arc(x, y, 0.4 * r, 0, 2 * Math.PI); c.fill(); } // as yellow as undetected for some
 }
 
 /** The selected pair: its bodies, and a ring around its point. */

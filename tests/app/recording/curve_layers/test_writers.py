@@ -29,7 +29,7 @@ from rodsight.solver.contacts.contacts import Contacts
 from rodsight.solver.statistics.balance import grain_unbalance
 
 from tests.app.recording.fake_results import make_results
-from tests.app.recording.rows import latest
+from tests.app.recording.rows import latest, rows
 
 ROUNDING = 1e-12
 FLOAT32 = 1e-6
@@ -183,6 +183,14 @@ def test_bands_are_two_standard_deviations_wide_and_recorded_forces_are_shown_be
     band = latest(path, entities.FRICTION_ANGLE + entities.BAND, entities.FRAME, 1)["Scalars:scalars"]
     assert band == pytest.approx([angle - 3.0, angle + 3.0])
     assert latest(path, entities.WALL_NORMAL_RECORDED, entities.FRAME, 1)["Scalars:scalars"][0] == pytest.approx(40.0)
+
+
+def test_every_wall_has_a_curve_of_its_own_colour_and_marker(tmp_path):
+    path = write_recording(make_results(2, sweeps=2), tmp_path / "run.rrd").path
+    style = {name: value for row in rows(path, entities.WALL_NORMAL_FORCE) for name, value in row.items()}
+    colours, markers = style["SeriesLines:colors"], style["SeriesPoints:markers"]
+    assert len(set(colours)) == len(set(markers)) == len(style["SeriesLines:names"]) == 4
+    assert style["SeriesPoints:colors"] == colours
 
 
 def test_every_curve_of_the_statistics_has_its_band_and_every_plot_that_shows_it_shows_both(tmp_path):
