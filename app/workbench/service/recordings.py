@@ -8,7 +8,7 @@ from __future__ import annotations
 import gzip
 import threading
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import quote
 
 from pydantic import Field
@@ -16,16 +16,14 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
 from ...process.errors import InputError
-from ...recording.archive.cards import make_card
-from ...recording.archive.share import share_recording
-from ...recording.look.canvas import Canvas
 from ...recording.parts import parts_of
-from ...recording.viewing.single_page import write_single_page
-from ...recording.viewing.web_viewer import WebViewer, read_web_viewer
 from ...run_folder import LATER, RECORDING, SIDE
 from .endpoints import ExperimentQuery, Number, Text, Whole, endpoint
 from .project import Project
 from .workbench import Workbench
+
+if TYPE_CHECKING:  # with it comes rerun, a fifth of all import time, which no page needs before it shows a recording
+    from ...recording.viewing.web_viewer import WebViewer
 
 FILES = (RECORDING, SIDE)
 PATH = "/recording/"  # of the viewer's requests, which carry no cookie: <key>/<experiment>/<file>
@@ -51,6 +49,10 @@ def share(
     scale: Annotated[Number, Field(gt=0.0, le=1.0)] = 1.0, although_out_of_date: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
     """Write the HTML file that any browser opens, as `rodsight share --html` does, of frames first … stop − 1."""
+    from ...recording.archive.cards import make_card
+    from ...recording.archive.share import share_recording
+    from ...recording.viewing.single_page import write_single_page
+
     opened = workbench.project(at)
     source, target = opened.results / RECORDING, opened.results / f"{opened.results.name}-share.rrd"
     if not source.is_file():
@@ -94,6 +96,8 @@ def _shrink(opened: Project) -> int:
     data = opened.run_data()
     if data is None:
         return 1
+    from ...recording.look.canvas import Canvas
+
     return Canvas.around(data.tracks, opened.scene().scale, opened.validation().shape).shrink
 
 
@@ -121,6 +125,8 @@ class Viewer:
     def _read(self) -> WebViewer:
         with self._lock:
             if self._viewer is None:
+                from ...recording.viewing.web_viewer import read_web_viewer
+
                 self._viewer = read_web_viewer()
             return self._viewer
 

@@ -71,3 +71,10 @@ main()
 """
     command = [sys.executable, "-c", code, "run", made_photographs, "--out", tmp_path / "run", "--quiet"]
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() == "[]"
+
+
+def test_the_workbench_starts_without_what_only_shows_recordings_or_exports():
+    code = "import sys, rodsight.workbench.service.server, rodsight.workbench.command; print(sys.modules.keys() & {%s})"
+    heavy = ", ".join(f"'{name}'" for name in ("rerun", "pandas", "matplotlib", "vtk"))
+    done = subprocess.run([sys.executable, "-c", code % heavy], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
