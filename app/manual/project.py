@@ -21,7 +21,9 @@ URLS = {"repository": "Repository", "issues": "Issues", "documentation": "Docume
 CITATION = {"repository": "repository-code", "documentation": "url", "doi": "doi"}
 PAGES = {"repository": "repo_url", "documentation": "site_url"}
 RECIPE = ".ci/conda/recipe.yaml"
-CONDA_NAMES = {"opencv-python-headless": "py-opencv", "matplotlib": "matplotlib-base"}  # that differ on conda-forge
+CONDA_NAMES = {  # that differ on conda-forge
+    "opencv-python-headless": "py-opencv", "matplotlib": "matplotlib-base", "isal": "python-isal",
+}  # fmt: skip
 FORMS = {
     **dict.fromkeys(("repository", "issues", "documentation"), r"https://\S+\.\S+"),
     "doi": r"10\.\d{4,9}/\S+",
