@@ -25,6 +25,7 @@ LOADING_ROUNDS, ROUNDS_OF = (
     40,
     2000,
 )  # at most, for this many rods; beyond, proportional to the rows of rods
+USUAL_STIFFNESS = 2e7  # [N/m]
 PREPARED = 1e-3  # force residual of grains and plate at which a packing is at rest
 
 
@@ -106,7 +107,8 @@ def prepare_packing(
     cell.run(np.zeros(SOFT_STEPS))
     loading = settings if loose else frictionless
     cell = place(loading, cell.position, height, LOADING_DRAG)
-    for _ in range(round(LOADING_ROUNDS * max(count / ROUNDS_OF, 1.0) ** 0.5)):
+    stiffness = max(settings.normal_stiffness / USUAL_STIFFNESS, 1.0)  # a step is shorter by its root
+    for _ in range(round(LOADING_ROUNDS * (stiffness * max(count / ROUNDS_OF, 1.0)) ** 0.5)):
         cell.run(np.zeros(LOADING_STEPS))
         if cell.unbalance < PREPARED and cell.plate_unbalance < PREPARED:
             return place(settings, cell.position, cell.height)

@@ -24,6 +24,7 @@ from .dense_packing import (
 )
 
 CORE_RATIO = 0.22  # radius of the core over the ring's
+SETTLING_DRAG = 8.0  # [1/s], of rods that fall
 LOOSENESS = 1.06  # initial radius of the ring over the dense one
 
 
@@ -61,6 +62,41 @@ def prepare_ring(
         if cell.unbalance < PREPARED and cell.plate_unbalance < PREPARED:
             return RingCell(radius, cell.position, ring=cell.ring, core=core, settings=settings)
     raise UnbalancedError(f"the packing of {count} rods did not come to rest: unbalance {cell.unbalance:.2g}")
+
+
+def prepare_drum(
+    count: int,
+    rng: np.random.Generator,
+    settings: DemSettings,
+    *,
+    sizes: Callable[[int, np.random.Generator], Array] = choose_radii,
+) -> RingCell:
+    """Let rods settle in a drum, half of which they fill, first without friction.
+
+    Returns
+    -------
+    RingCell
+        The drum at rest, with friction; the core lies outside.
+
+    Raises
+    ------
+    UnbalancedError
+        If the bed does not come to rest.
+    """
+    radius = sizes(count, rng)
+    ring = float(np.sqrt(2.0 * np.sum(radius**2) / SOLID_FRACTION))
+    outside = {"ring": ring, "core": 0.1 * ring, "core_place": (0.0, 3.0 * ring)}
+    frictionless = replace(settings, friction=0.0, wall_friction=0.0)
+    soft = replace(frictionless, normal_stiffness=SOFTENING * settings.normal_stiffness, gravity=(0.0, 0.0))
+    position = _scatter(count, rng, 0.0, ring - float(radius.max()))
+    cell = RingCell(radius, position, settings=soft, drag=SOFT_DRAG, **outside)
+    cell.run(np.zeros(SOFT_STEPS))
+    cell = RingCell(radius, cell.position, settings=frictionless, drag=SETTLING_DRAG, **outside)
+    for _ in range(LOADING_ROUNDS):
+        cell.run(np.zeros(LOADING_STEPS))
+        if cell.unbalance < PREPARED:
+            return RingCell(radius, cell.position, settings=settings, **outside)
+    raise UnbalancedError(f"the bed of {count} rods did not come to rest: unbalance {cell.unbalance:.2g}")
 
 
 def _scatter(count: int, rng: np.random.Generator, core: float, ring: float) -> Array:

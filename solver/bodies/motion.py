@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 
 from .cell import Cell
 from .grains import Array, GrainMotion
-from .strain import displacement_gradient, shear_strain
+from .strain import RigidMotion, displacement_gradient, find_dominant_rigid_motion, shear_strain
 from .wall_shapes import wall_displacement, walls_before
 from .walls import Walls
 
@@ -59,6 +59,15 @@ class LastSeen:
             np.where(here[:, None], snapshot.position, self.position),
             np.where(here, snapshot.rotation, self.rotation),
         )
+
+    def moved(self, motion: RigidMotion, now: float, interval: float) -> LastSeen:
+        """The same with all grains moved as one body, once for every interval [s] since they were seen."""
+        position, rotation = self.position.copy(), self.rotation.copy()
+        times = np.nan_to_num(np.round((now - self.time) / interval))
+        for each in range(int(times.max(initial=0.0))):
+            again = times > each
+            position[again], rotation[again] = motion.moved(position[again]), rotation[again] + motion.angle
+        return LastSeen(self.time, position, rotation)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +125,11 @@ def motion_to(
     former_cell : (2, 2), optional
         Cell vectors of the frame before [m].
 
+    Returns
+    -------
+    FrameMotion
+        Without the motion that the packing makes as one rigid body, where that exceeds the rest by far.
+
     Raises
     ------
     ValueError
@@ -124,6 +138,10 @@ def motion_to(
     interval = snapshot.time - former_time
     if not interval > 0:
         raise ValueError(f"the time of a frame ({snapshot.time} s) is not after that of the frame before it")
+    before = snapshot.present & (seen.time == former_time)
+    rigid = None if former_cell is not None else find_dominant_rigid_motion(seen.position, snapshot.position, before)
+    if rigid is not None:
+        seen, former_endpoints = seen.moved(rigid, snapshot.time, interval), rigid.moved(former_endpoints)
     velocity, spin = _velocities(snapshot, seen)
     grains = GrainMotion(snapshot.position, velocity, spin, snapshot.present)
     wall_velocity = wall_displacement(former_endpoints, snapshot.endpoints, snapshot.side) / interval
@@ -135,11 +153,19 @@ def motion_to(
 
 
 def motion_from(snapshot: Snapshot, following: Snapshot) -> FrameMotion:
-    """Return the motion from the first snapshot to the following one, taken at the first."""
+    """Return the motion from the first snapshot to the following one, taken at the first; see `motion_to`."""
     interval = following.time - snapshot.time
     if not interval > 0:
         raise ValueError(f"the time of the second frame ({following.time} s) is not after that of the first")
     both = snapshot.present & following.present
+    rigid = (
+        None if snapshot.cell is not None else find_dominant_rigid_motion(following.position, snapshot.position, both)
+    )
+    if rigid is not None:
+        following = replace(
+            following, position=rigid.moved(following.position), rotation=following.rotation + rigid.angle,
+            endpoints=rigid.moved(following.endpoints),
+        )  # fmt: skip
     seen = LastSeen.never(len(both)).updated(snapshot)
     velocity, spin = _velocities(following, seen)
     velocity[~both], spin[~both] = 0.0, 0.0

@@ -1,6 +1,13 @@
-"""Strain of a packing: the homogeneous motion that fits that of its grains best; the time by which its rate is fast."""
+"""The homogeneous and the rigid motion that fit that of a packing's grains best; the time by which a rate is fast.
+
+The motion that a packing makes as one rigid body, with its boundary, changes no force: a drum turns with its bed, a box
+is tilted, a camera is turned between two photographs. What is read of the motion must not depend on that part, which
+can be a thousand times as large as the rest.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -9,6 +16,8 @@ from numpy.typing import NDArray
 from .grains import Array
 
 MIN_GRAINS = 4  # fewer give no gradient
+DOMINANT = 5.0  # rms of the rigid displacement over that of the rest, above which it is removed; in shear it is 3
+FEWEST = 3  # grains
 
 
 def displacement_gradient(
@@ -81,3 +90,47 @@ def inertial_time(mass: float, pressure: float, length: float) -> float:
         Length of the rods L [m].
     """
     return float(np.sqrt(mass / (pressure * length)))
+
+
+@dataclass(frozen=True, slots=True)
+class RigidMotion:
+    """A rotation about the origin, then a displacement."""
+
+    angle: float  # [rad]
+    displacement: Float[Array, " 2"]  # [m]
+
+    def moved(self, point: Array) -> Array:
+        """Points (…, 2) [m] after the motion."""
+        cosine, sine = np.cos(self.angle), np.sin(self.angle)
+        return point @ np.array([[cosine, sine], [-sine, cosine]]) + self.displacement
+
+
+def find_dominant_rigid_motion(before: Array, after: Array, present: NDArray[np.bool_]) -> RigidMotion | None:
+    """Find the rigid motion that fits the grains best (least squares), where it exceeds the rest by far.
+
+    Parameters
+    ----------
+    before, after : (n, 2)
+        Positions [m].
+    present : (n,) bool
+        Grains whose positions are known in both.
+
+    Returns
+    -------
+    RigidMotion, or None
+        None where the grains' own motion is a fifth of it or more.
+
+    Notes
+    -----
+    With centred positions x and y the angle is atan2(Σ x × y, Σ x · y) (Kabsch, Acta Cryst. A32, 922, 1976).
+    """
+    if present.sum() < FEWEST:
+        return None
+    x, y = before[present], after[present]
+    x0, y0 = x.mean(axis=0), y.mean(axis=0)
+    u, v = x - x0, y - y0
+    angle = float(np.arctan2(np.sum(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]), np.sum(u * v)))
+    turned = RigidMotion(angle, np.zeros(2))
+    found = RigidMotion(angle, y0 - turned.moved(x0))
+    rest, rigid = y - found.moved(x), found.moved(x) - x
+    return found if np.sum(rigid**2) > DOMINANT**2 * np.sum(rest**2) else None

@@ -14,6 +14,7 @@ from .grains import Array
 
 STRAIGHT, IN, OUT = 0, 1, -1  # shape of a wall: straight, or a circle with the packing inside or outside
 CORNERS = 72  # of the polygon that draws a circle
+ACROSS = 0.05  # radii by which a grain reaches beyond the line of a wall that ends beside it
 ALIKE = 0.9  # cosine of the greatest angle of two walls that face the same way
 Sides = NDArray[np.int8] | None
 
@@ -104,7 +105,7 @@ def beside_wall(endpoints: Array, side: Sides, point: Array, margin: Array) -> N
     return beside if side is None else beside | (side != STRAIGHT)
 
 
-def faces_walls(endpoints: Array, side: Sides, point: Array, margin: Array) -> NDArray[np.bool_]:
+def faces_walls(endpoints: Array, side: Sides, point: Array, radius: Array) -> NDArray[np.bool_]:
     """Return which walls grains can touch.
 
     Parameters
@@ -115,21 +116,23 @@ def faces_walls(endpoints: Array, side: Sides, point: Array, margin: Array) -> N
         Shapes of the walls.
     point : (n, 2)
         Centres [m].
-    margin : (n,)
-        Distance [m] past an end within which a straight wall is taken to go on.
+    radius : (n,)
+        Radii [m].
 
     Returns
     -------
     (n, w)
-        True beside a wall. Past its end within the margin it is True unless the grain is beside another wall that faces
-        the same way, as in a box that is split.
+        True beside a wall. A straight wall is taken to go on for a radius past its ends, but neither along another wall
+        that faces the same way, as in a box that is split, nor across a grain, as one beside a footing.
     """
-    near = beside_wall(endpoints[None], None if side is None else side[None], point[:, None], margin[:, None])
-    another = beside_another(endpoints, side, point)
-    if another is None:
+    rows, shape, place = endpoints[None], None if side is None else side[None], point[:, None]
+    near = beside_wall(rows, shape, place, radius[:, None])
+    past = near & ~beside_wall(rows, shape, place, np.zeros(1))
+    if not past.any():
         return near
-    beside = beside_wall(endpoints[None], None if side is None else side[None], point[:, None], np.zeros(1))
-    return beside | (near & ~another)
+    across = distance_from_walls(rows, shape, place) < (1.0 - ACROSS) * radius[:, None]
+    another = beside_another(endpoints, side, point)
+    return near & ~(past & (across if another is None else across | another))
 
 
 def beside_another(endpoints: Array, side: Sides, point: Array) -> NDArray[np.bool_] | None:

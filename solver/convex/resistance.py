@@ -16,13 +16,10 @@ from ..bodies.packing import Packing
 from ..contacts.contacts import Contacts
 from ..detection.touch_probability import ContactProbabilitySettings
 from ..parallel import parallel_map
-from .friction_check import sliding_frame
+from .friction_check import LEAST_GAP, MOST_GAP, QUIET, is_clearly_less, on_better_contacts, sliding_frame
 from .program import weigh_rows
 from .sliding_model import Parameter, ResistedFrame, SlidingModel, compare_models, power_gap
 
-CLEAR = 0.62  # gap of a rival over that of the given model, and of another friction alone, below which it is named
-LEAST_GAP = 0.03  # fall of the gap below which nothing is decided
-MOST_GAP = 0.25  # gap above which not even the best rival explains the sliding
 REVERSED = 0.5  # gap of the reversed motion over that of the given one, below which it is named
 AHEAD = 0.85  # gap of the winner over that of the second
 FRAMES = 4  # consecutive photographs on which models are compared
@@ -33,7 +30,6 @@ MOST_FRICTION = 3.0  # times the given friction: with more, forces on a few cont
 # sheared packings of 200 rods whose contacts resist rolling it is .39 to .78 (seeds 20 to 22, 30, 40, 44, 45), and
 # without it 1.
 ROLLING = 0.8
-QUIET = 0.1  # gap of the given model below which nothing else is looked for
 # Weight of torque equations: moments that no contact force exerts, of a base or of flattened contacts, then hardly hide
 # the resistance to sliding. On 200 rods the gap of the true cause falls to .1 to .6 of that of the given model, before
 # to .1 to .7; that of others stays above .94 of it.
@@ -92,7 +88,7 @@ def find_resistance(frames: Sequence[ResistedFrame], given: SlidingModel, worker
         del sound["friction"]
     friction = sound["friction"].gap if "friction" in sound else before
     best = min((name for name in sound if name != "friction"), key=lambda name: sound[name].gap, default="")
-    if best and _is_clearly_less(sound[best].gap, min(before, friction)):
+    if best and is_clearly_less(sound[best].gap, min(before, friction)):
         others = [each.gap for name, each in sound.items() if name not in (best, "friction")]
         if all(sound[best].gap < AHEAD * other for other in others):
             return Resistance(best, given, before, sound[best].model, sound[best].gap)
@@ -101,7 +97,7 @@ def find_resistance(frames: Sequence[ResistedFrame], given: SlidingModel, worker
     least = min(MOST_GAP, before - LEAST_GAP, ROLLING * before, ROLLING * friction)
     if rolling.enclosed and rolling.gap < least:
         return Resistance("rolling_resistance", given, before, rolling.model, rolling.gap)
-    if "friction" in sound and _is_clearly_less(friction, before):
+    if "friction" in sound and is_clearly_less(friction, before):
         return Resistance("friction", given, before, sound["friction"].model, friction)
     return nothing
 
@@ -135,7 +131,7 @@ def find_unstated(
         fitted = compare_models(frames, model, [UNSTATED[name] for name in left], workers)
         gap = np.array([each.gap if each.enclosed else before for each in fitted])
         best = int(np.argmin(gap))
-        if not _is_clearly_less(gap[best], before) or (np.delete(gap, best) * AHEAD < gap[best]).any():
+        if not is_clearly_less(gap[best], before) or (np.delete(gap, best) * AHEAD < gap[best]).any():
             break
         model = fitted[best].model
         del left[best]
@@ -164,10 +160,6 @@ def find_in_sequence(
     return find_resistance(frames, model_of(packing, force_unit), workers)
 
 
-def _is_clearly_less(gap: float, other: float) -> bool:
-    return gap < min(CLEAR * other, other - LEAST_GAP, MOST_GAP)
-
-
 def resisted_frames(
     packing: Packing,
     snapshots: Sequence[Snapshot],
@@ -190,9 +182,13 @@ def resisted_frames(
     workers : int, optional
         Threads.
     """
-    return parallel_map(
-        [partial(_resisted_frame, packing, snapshots, k, force_unit, settings) for k in numbers], workers
-    )
+
+    def make(completed: bool) -> list[ResistedFrame]:
+        return parallel_map(
+            [partial(_resisted_frame, packing, snapshots, k, force_unit, settings, completed) for k in numbers], workers
+        )
+
+    return on_better_contacts(make)
 
 
 def model_of(packing: Packing, force_unit: float) -> SlidingModel:
@@ -208,10 +204,15 @@ def base_drag_of(packing: Packing, model: SlidingModel, force_unit: float) -> fl
 
 
 def _resisted_frame(
-    packing: Packing, snapshots: Sequence[Snapshot], k: int, force_unit: float, settings: ContactProbabilitySettings
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    k: int,
+    force_unit: float,
+    settings: ContactProbabilitySettings,
+    completed: bool,
 ) -> ResistedFrame:
     free = replace(packing, grains=replace(packing.grains, drag=None, moment=None, moment_sd=None))
-    frame = sliding_frame(free, snapshots, k, force_unit, settings)
+    frame = sliding_frame(free, snapshots, k, force_unit, settings, completed=completed)
     count = int((snapshots[k].present & packing.grains.free).sum())
     rows = np.ones(len(frame.balance.load))
     rows[2 * count : 3 * count] = TORQUE_WEIGHT

@@ -21,6 +21,7 @@ from .boundaries import (
     CELL,
     FRAME,
     RIGHT,
+    RING,
     RING_WALL,
     TOP,
     TOP_LEFT,
@@ -168,12 +169,13 @@ def grain_forces(
 def wall_forces(bodies: DemBodies, pairs: DemPairs, law: Law, boundary: Boundary, drive: Array) -> tuple[float, float]:
     """Add the forces of the walls to `bodies.force`.
 
-    Return the sums of the forces [N] normal to plate and right side of a frame; on the ring, and zero. The discs of the
-    plate are part of it.
+    Return the sums of the forces [N] normal to plate and right side of a frame; on the ring or the plate of a box, and
+    zero. The discs of the plate are part of it.
     """
     state, force, radius = bodies.state, bodies.force, bodies.radius
     linkage = linkage_motion(boundary, drive)
-    first_wall, second_wall = (TOP, RIGHT) if boundary.kind == FRAME else (RING_WALL, -1)
+    first_wall = RING_WALL if boundary.kind == RING else TOP
+    second_wall = RIGHT if boundary.kind == FRAME else -1
     first, second = 0.0, 0.0
     for p in range(pairs.i.shape[0]):
         i, wall = pairs.i[p], pairs.j[p]

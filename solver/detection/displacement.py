@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from ..bodies.cell import Cell
 from ..bodies.grains import Array
+from ..bodies.strain import find_dominant_rigid_motion
 from ..bodies.wall_shapes import wall_displacement
 from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts
@@ -94,7 +95,8 @@ def _displacement_scale(*arrays: bytes) -> float:
     if count < 1:
         raise ValueError("fewer than two grains are seen in both frames: no displacement scale")
     distance, near = _neighbours(before[seen].tobytes(), count)
-    moved = after[seen] - before[seen]
+    rigid = find_dominant_rigid_motion(before[seen], after[seen], np.ones(len(seen), np.bool_))
+    moved = after[seen] - (before[seen] if rigid is None else rigid.moved(before[seen]))
     non_affine = moved - moved[near].mean(axis=1)
     variance = sigma[seen] ** 2
     noise = 2.0 * (variance.mean() + variance[near].mean() / count)

@@ -20,6 +20,7 @@ from ..assessment.status import SETTLED_DIFFERENCE
 from ..bodies.grains import Array
 from ..contacts.contacts import Contacts
 from ..contacts.pairs import are_among
+from ..convex.dual_prices import ROUNDS
 from ..convex.ensemble_members import NormalisedSlip, RefinedMotion, Slip, advance_convex_member, read_slip, steady_slip
 from ..convex.friction_estimate import relative_power_gap
 from ..convex.program import Balance, ConvexForces, LoadScale, assemble_balance, project_onto_equilibrium
@@ -35,7 +36,7 @@ from ..statistics.agreement import relative_change
 from ..statistics.sliding import cone_fraction
 from .frame_contacts import TouchingPairs, find_touching
 from .frame_problem import FrameProblem
-from .missing_contacts import BEARING_FRACTION, NO_MISSING, ROUNDS, MissingContacts, find_missing_contacts
+from .missing_contacts import BEARING_FRACTION, NO_MISSING, MissingContacts, find_missing_contacts
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,6 +31,7 @@ from ...solver.assessment.expected_correlation import MEASURES, rests_on_overlap
 from ...solver.assessment.intervals.scale_sd import scale_terms
 from ...solver.bodies.grains import Array
 from ...solver.contacts.pairs import Keys, match_values
+from ...solver.dem.dem_truth import UnbalancedError
 from ...solver.frame_forces import FrameForces, FrameStatus
 from ...solver.statistics.agreement import Agreement, compare_forces
 from ...synthetic.scenarios.preset_names import ScenarioName
@@ -103,11 +104,14 @@ class StudyPlan:
 def score_scenario(
     plan: StudyPlan, scenario: ScenarioName, seed: int, progress: Progress = no_progress
 ) -> ScenarioScore:
-    """Make a scenario, solve it and compare it with the truth. Raises UnbalancedError."""
+    """Make a scenario, solve it and compare it with the truth; one that does not rest counts as refused."""
     with TemporaryDirectory() as folder:
-        made = make_scenario(
-            Path(folder), scenario, seed, grains=plan.grains, cache=plan.folder / "kept", progress=progress
-        )
+        try:
+            made = make_scenario(
+                Path(folder), scenario, seed, grains=plan.grains, cache=plan.folder / "kept", progress=progress
+            )
+        except UnbalancedError as error:
+            return ScenarioScore(scenario, seed, str(error))
         began = time.process_time()
         try:
             experiment = load_experiment(made.folder, plan.settings)

@@ -32,7 +32,7 @@ GROUPS: tuple[Group, ...] = ("correct", "missing physics", "wrong input")
 LEFT_OUT = frozenset({
     "step_1", "circle", "corners", "radii_03", "strong_cohesion", "rolling", "stiff_moving", "theta_sign", "aspect_03",
     "walls_late", "swapped_frames", "shuffled", "outliers", "one_jump", "missing_poses", "tilted_bed", "stiff_loose",
-    "rough_walls", "rising_corners",
+    "rough_walls", "rising_corners", "shear_box", "footing", "intruder", "drum", "stiffest",
 })  # fmt: skip
 TOO_HIGH, TOO_LOW = TRUST_TOLERANCE, 0.15  # T above r, T below r
 # Excess of T over r, and fraction of the frames of any group that may have more while their kind is left out: what T

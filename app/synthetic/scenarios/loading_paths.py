@@ -45,6 +45,7 @@ class LoadingPath:
     open_top: bool = False  # a heap under its weight
     periodic: bool = False  # in simple shear, without walls
     ring: bool = False  # between two circles
+    bed: bool = False  # of an apparatus of `bed_paths`
 
 
 def simulate_loading(loading: LoadingPath, grains: int, seed: int, progress: Progress = no_progress) -> DemTruth:

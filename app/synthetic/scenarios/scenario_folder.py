@@ -12,11 +12,12 @@ import numpy as np
 from ...process.atomic import replacing
 from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
-from ...solver.dem import boundaries, contact_law, periodic_cell, ring_cell, shear_cell, simulation, time_step
+from ...solver.dem import boundaries, box_cell, contact_law, periodic_cell, ring_cell, shear_cell, simulation, time_step
 from ...solver.dem.dem_truth import DemSettings, DemTruth
 from .. import dense_packing, ring_packing
 from ..experiment_files import refuse_full_folder
-from . import loading_paths, periodic_packing
+from . import bed_paths, loading_paths, periodic_packing
+from .bed_paths import simulate_bed
 from .loading_paths import LoadingPath, simulate_loading
 from .observed_data import observe_truth, write_observed
 from .preset_names import ScenarioName
@@ -91,12 +92,13 @@ def load_or_simulate(
     loading: LoadingPath, grains: int, seed: int, folder: Path | None, progress: Progress = no_progress
 ) -> DemTruth:
     """Load the truth of a loading path from the folder, or simulate and store it there; None: simulate."""
+    simulate = simulate_bed if loading.bed else simulate_loading
     if folder is None:
-        return simulate_loading(loading, grains, seed, progress)
+        return simulate(loading, grains, seed, progress)
     file = folder / f"truth_{_fingerprint(loading)}_{grains}_{seed}.npz"
     if file.exists():
         return load_truth(file, loading.settings)
-    truth = simulate_loading(loading, grains, seed, progress)
+    truth = simulate(loading, grains, seed, progress)
     save_truth(file, truth)
     return truth
 
@@ -140,6 +142,8 @@ def _fingerprint(loading: LoadingPath) -> str:
     modules = [contact_law, boundaries, time_step, simulation, shear_cell, dense_packing, loading_paths]
     if loading.periodic:
         modules += [periodic_cell, periodic_packing]
+    if loading.bed:
+        modules += [box_cell, ring_cell, ring_packing, bed_paths]
     if loading.ring:
         modules += [ring_cell, ring_packing]
     for module in modules:

@@ -11,6 +11,7 @@ import numpy as np
 from ...solver.bodies.grains import Array
 from ...solver.dem.dem_truth import DemSettings
 from ..dense_packing import choose_two_radii, choose_wide_radii
+from .bed_paths import press_footing, push_intruder, slide_box, turn_drum
 from .departures import (
     HIGH_FRICTION,
     LOW_FRICTION,
@@ -229,6 +230,27 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     "power_law": Scenario("sheared; radii 1:6, most of them small", replace(MOVED, sizes=_choose_by_power_law)),
     "noise_40": Scenario("sheared; 40 µm noise", MOVED, noise=4e-5),
     "correlated_noise": Scenario("sheared; further errors of 10 µm that change slowly", MOVED, correlate_noise),
+    "intruder": Scenario(
+        "a disc is pushed sideways through a bed with a free surface, .1 % of its width a photograph; no plate",
+        LoadingPath(push_intruder, 0.001, settings=HEAP, bed=True),
+    ),
+    "drum": Scenario(
+        "a drum that is half full turns by .75° a photograph; no plate",
+        LoadingPath(turn_drum, 0.75, settings=HEAP, bed=True),
+    ),
+    "shear_box": _missing(
+        "direct shear box: the upper half slides over the lower one by .2 % of the width a photograph; its edges bear "
+        "on rods",
+        LoadingPath(slide_box, 0.002, plates=("top",), bed=True),
+    ),
+    "footing": _missing(
+        "a bar is pressed into a bed with a free surface, .1 % of its width a photograph; its edges bear on rods",
+        LoadingPath(press_footing, 0.001, settings=HEAP, bed=True),
+    ),
+    "stiffest": _missing(
+        "contacts fifty times as stiff, photographed at rest; packed with friction",
+        replace(_sheared(normal_stiffness=1e9), loose=True),
+    ),
     "stiff": _missing("sheared; contacts ten times as stiff, photographed at rest", _sheared(normal_stiffness=2e8)),
     "stiff_moving": _missing(
         "the same, photographed while it moves",

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 from rodsight.cli.main import main
+from rodsight.solver.dem.dem_truth import UnbalancedError
 from rodsight.study.scenarios import score_table
 from rodsight.study.scenarios.scenario_score import ScenarioScore, StudyPlan, score_scenario
 from rodsight.study.scenarios.score_table import as_json, print_scores, score_scenarios
@@ -161,3 +162,12 @@ def test_the_command_prints_json_of_the_requested_scenarios(tmp_path, monkeypatc
     assert ended.value.code == 0
     assert requested == [(450, ("solver.kappa=0.2", "solver.estimator=nlgs"), "soft", 3)]
     assert json.loads(capsys.readouterr().out)["worlds"][0]["world"] == "soft"
+
+
+def test_a_packing_that_does_not_rest_takes_no_other_scenario_with_it(tmp_path, monkeypatch) -> None:
+    def restless(*_, **__) -> None:
+        raise UnbalancedError("the packing of 40 rods did not come to rest: unbalance 0.14")
+
+    monkeypatch.setattr("rodsight.study.scenarios.scenario_score.make_scenario", restless)
+    found = score_scenario(StudyPlan(FEW, tmp_path), "shear", 1)
+    assert "did not come to rest" in found.refused

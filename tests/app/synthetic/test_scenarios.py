@@ -17,10 +17,12 @@ from rodsight.solver.bodies.grains import Grains
 from rodsight.solver.bodies.wall_shapes import circle_parameters
 from rodsight.solver.bodies.walls import Walls
 from rodsight.solver.contacts.contacts import measure_contacts
+from rodsight.solver.dem.box_cell import BOX_NAMES
 from rodsight.solver.dem.dem_truth import DemTruth
 from rodsight.solver.statistics.balance import resultant_norms
 from rodsight.synthetic.dense_packing import WIDE_RADII, choose_two_radii, choose_wide_radii
 from rodsight.synthetic.scenarios import departures
+from rodsight.synthetic.scenarios.bed_paths import simulate_bed
 from rodsight.synthetic.scenarios.loading_paths import simulate_loading
 from rodsight.synthetic.scenarios.observed_data import ObservedData, observe_truth
 from rodsight.synthetic.scenarios.preset_names import ScenarioName
@@ -106,6 +108,29 @@ def test_a_packing_around_a_moving_core_is_in_equilibrium_under_the_rings_pressu
     centre, _, angle = circle_parameters(truth.endpoints[:, 1])
     assert centre[2, 0] - centre[0, 0] == pytest.approx(0.02 * 0.5 * np.ptp(truth.endpoints[0, 0, :, 0]), rel=LOAD)
     assert angle == pytest.approx([0.0, 0.02, 0.04])
+
+
+@pytest.mark.parametrize(
+    ("name", "walls"),
+    [("shear_box", (*BOX_NAMES[:-1],)), ("footing", ("bottom", "right", "left", "footing")),
+     ("intruder", ("bottom", "right", "left", "intruder")), ("drum", ("ring",))],
+)  # fmt: skip
+def test_the_truths_of_other_apparatus_are_in_equilibrium(name: ScenarioName, walls: tuple[str, ...]) -> None:
+    truth = simulate_bed(replace(SCENARIOS[name].loading, frames=2), FEW, seed=3)
+    assert truth.wall_names == walls
+    assert truth.unbalance.max() < BALANCE
+    weight = np.pi * truth.radius**2 * truth.settings.density * truth.settings.length * 9.81
+    if name == "shear_box":
+        assert force_on(truth, "top") == pytest.approx(force_on(truth, "top")[0], rel=LOAD)
+        assert (np.diff(truth.endpoints[:, walls.index("upper-left"), 0, 0]) > 0).all()
+    elif name == "drum":
+        angle = circle_parameters(truth.endpoints[:, 0])[2]
+        assert np.rad2deg(np.diff(angle)) == pytest.approx([0.75])
+        assert np.allclose(truth.position[1] - truth.position[0], 0.0, atol=0.01)
+    else:
+        assert (force_on(truth, walls[-1]) > 0.0).all()
+    if name == "footing":
+        assert force_on(truth, "bottom") == pytest.approx(weight.sum() + force_on(truth, "footing"), rel=0.3)
 
 
 def test_loads_are_stated_exactly_and_circles_in_a_separate_table(tmp_path: Path, monkeypatch) -> None:

@@ -114,6 +114,25 @@ MUTANTS = [
         ("x[0], x[2]))", "x[0], x[0]))"),
     ),
     *mutants_of(
+        "solver/convex/friction_check.py",
+        SLIDING,
+        ("return gap < min(CLEAR * other, other - LEAST_GAP, MOST_GAP)", "return gap < min(CLEAR * other, MOST_GAP)"),
+        (
+            "return gap < min(CLEAR * other, other - LEAST_GAP, MOST_GAP)",
+            "return gap < min(CLEAR * other, other - LEAST_GAP)",
+        ),
+    ),
+    *mutants_of(
+        "solver/convex/friction_check.py",
+        ("tests/solver/convex/test_friction_check.py",),
+        ("return completed if is_clearly_less(", "return completed if not is_clearly_less("),
+        (
+            "match_values(joined, contacts.key, probability) + match_values(joined, key, chance)",
+            "match_values(joined, contacts.key, probability)",
+        ),
+        ("for _ in range(ROUNDS if completed else 0):", "for _ in range(0):"),
+    ),
+    *mutants_of(
         "solver/convex/resistance.py",
         SLIDING,
         ("if turned < min(REVERSED * before, before - LEAST_GAP, MOST_GAP):", "if turned < MOST_GAP:"),
@@ -122,11 +141,6 @@ MUTANTS = [
         ("> MOST_FRICTION * given.friction:", "> 1e9 * given.friction:"),
         ("min(before, friction))", "before)"),
         ('if name not in (best, "friction")', "if name not in (best, *sound)"),
-        ("return gap < min(CLEAR * other, other - LEAST_GAP, MOST_GAP)", "return gap < min(CLEAR * other, MOST_GAP)"),
-        (
-            "return gap < min(CLEAR * other, other - LEAST_GAP, MOST_GAP)",
-            "return gap < min(CLEAR * other, other - LEAST_GAP)",
-        ),
         ("if not before > QUIET or", "if"),
         ("< REVERSED * before:\n            break", "< 0.0:\n            break"),
         ("(np.delete(gap, best) * AHEAD < gap[best]).any()", "False"),

@@ -55,7 +55,10 @@ MUTANTS = [
         ("BASE_ARM = 2.0 / 3.0", "BASE_ARM = 1.0"),
         ("            base[k, 0] = fx\n", ""),
         ("approach = grain_speed + max(grain_speed, wall_speed)", "approach = grain_speed"),
-        ("(TOP, RIGHT) if boundary.kind == FRAME", "(RIGHT, RIGHT) if boundary.kind == FRAME"),
+        (
+            "RING_WALL if boundary.kind == RING else TOP",
+            "RING_WALL if boundary.kind == RING else RIGHT",
+        ),
     ),
     *mutants_of(
         "solver/dem/simulation.py",

@@ -8,8 +8,7 @@ MUTANTS = [
     *mutants_of(
         "solver/sequence",
         ("tests/solver/sequence/test_missing_contacts.py",),
-        ("known = join_keys(contacts.key, problem.verdicts.forbidden)", "known = contacts.key"),
-        ("if not price[row] > least:", "if True:"),
+        ("known, ensemble = join_keys(contacts.key, problem.verdicts.forbidden),", "known, ensemble = contacts.key,"),
         ("source[missing] = ContactSource.FROM_BALANCE", "pass"),
     ),
     *mutants_of(
@@ -17,6 +16,7 @@ MUTANTS = [
         ("tests/solver/convex/test_dual_prices.py",),
         ("velocity[pairs.i] - velocity[pairs.j]", "velocity[pairs.j] - velocity[pairs.i]"),
         ("velocity[n + plates] = ", "velocity[n + plates] = 0.0 * "),
+        ("if not price[row] > least:", "if True:"),
     ),
     *mutants_of(
         "solver/sequence",

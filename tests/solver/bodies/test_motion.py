@@ -13,6 +13,7 @@ from tests.packings import LENGTH, box, rods
 
 WALLS = box(0.1, 0.05).endpoints
 START = np.array([[0.01, 0.01], [0.03, 0.01], [0.05, 0.01], [0.01, 0.03], [0.03, 0.03]])
+OWN = 1e-3 * np.array([[0.0, 2.0], [3.0, 0.0], [-3.0, 1.0], [0.0, -3.0], [0.0, 0.0]])  # [m], motion that is not rigid
 
 
 def snapshot(time, moved=(0.0, 0.0), turned=0.0, present=None, walls=WALLS, sigma=1e-6):
@@ -30,19 +31,19 @@ def seen(*snapshots):
 def test_velocity_is_displacement_over_interval():
     first = snapshot(10.0)
     walls = WALLS + np.array([0.004, -0.002])
-    motion = motion_to(snapshot(12.0, (0.002, -0.006), 0.1, walls=walls), seen(first), 10.0, first.endpoints)
+    motion = motion_to(snapshot(12.0, OWN, 0.1, walls=walls), seen(first), 10.0, first.endpoints)
     assert motion.interval == 2.0
     assert motion.ends_here
-    assert motion.grains.velocity == pytest.approx(np.tile([0.001, -0.003], (5, 1)))
+    assert motion.grains.velocity == pytest.approx(0.5 * OWN)
     assert motion.grains.spin == pytest.approx(np.full(5, 0.05))
     assert motion.wall_velocity == pytest.approx(np.broadcast_to([0.002, -0.001], (4, 2, 2)))
 
 
 def test_grain_seen_again_has_its_mean_velocity_since_then():
-    first, lost = snapshot(0.0), snapshot(1.0, (1e-3, 0.0), present=[1, 1, 0, 1, 1])
-    motion = motion_to(snapshot(2.0, (4e-3, 0.0), 0.2), seen(first, lost), 1.0, WALLS)
-    assert motion.grains.velocity[2, 0] == pytest.approx(2e-3)
-    assert motion.grains.velocity[0, 0] == pytest.approx(3e-3)
+    first, lost = snapshot(0.0), snapshot(1.0, OWN, present=[1, 1, 0, 1, 1])
+    motion = motion_to(snapshot(2.0, 4.0 * OWN, 0.2), seen(first, lost), 1.0, WALLS)
+    assert motion.grains.velocity[2] == pytest.approx(2.0 * OWN[2])
+    assert motion.grains.velocity[0] == pytest.approx(3.0 * OWN[0])
     assert motion.grains.spin[2] == pytest.approx(0.1)
     assert motion.grains.spin[0] == pytest.approx(0.2)
 
@@ -58,19 +59,19 @@ def test_grain_seen_for_the_first_time_has_the_mean_velocity_of_its_neighbours()
 def test_between_photographs_everything_moves_evenly():
     first = snapshot(0.0)
     walls = WALLS + np.array([0.0, 8e-3])
-    motion = motion_to(snapshot(4.0, (8e-3, 0.0), walls=walls), seen(first), 0.0, WALLS)
+    motion = motion_to(snapshot(4.0, OWN, walls=walls), seen(first), 0.0, WALLS)
     for fraction in (0.25, 1.0):
         grains, there = motion.at(fraction, np.full(4, np.nan))
-        assert grains.position == pytest.approx(START + np.array([8e-3 * fraction, 0.0]))
+        assert grains.position == pytest.approx(START + fraction * OWN)
         assert there.endpoints == pytest.approx(WALLS + np.array([0.0, 8e-3 * fraction]))
         assert there.velocity == pytest.approx(np.broadcast_to([0.0, 2e-3], (4, 2, 2)))
 
 
 def test_first_frame_has_the_following_motion_and_no_earlier_instants():
-    following = snapshot(2.0, (2e-3, 0.0), 0.4, present=[1, 1, 1, 0, 1], walls=WALLS + 2e-3)
+    following = snapshot(2.0, OWN, 0.4, present=[1, 1, 1, 0, 1], walls=WALLS + 2e-3)
     motion = motion_from(snapshot(0.0), following)
     assert not motion.ends_here
-    assert motion.grains.velocity[:3] == pytest.approx(np.tile([1e-3, 0.0], (3, 1)))
+    assert motion.grains.velocity[:3] == pytest.approx(0.5 * OWN[:3])
     assert motion.grains.velocity[3].tolist() == [0.0, 0.0]  # it is lost afterwards
     assert motion.grains.spin.tolist() == pytest.approx([0.2, 0.2, 0.2, 0.0, 0.2])
     assert motion.wall_velocity == pytest.approx(np.full((4, 2, 2), 1e-3))
