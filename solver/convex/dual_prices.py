@@ -23,7 +23,8 @@ from .program import Balance, ConvexSettings
 
 REACH = 0.012  # of the mean diameter: gaps beyond which no error of radii and centres explains a contact
 REQUIRED_PRICE = 1.5  # price of a touching pair above which it is offered; it grows with the gap …
-GAP_SIGMAS = 2.0  # … the price counts half at a gap of so many standard deviations
+GAP_SIGMAS = 2.0  # … the price counts half at a gap of so many standard deviations, and falls with this power of it:
+GAP_POWER = 1.5  # a centre that a hand has placed may err by ten of them
 RELATIVE_PRICE = 0.3  # of the highest price: cheaper pairs are tested again in the next round
 MAX_PROBABILITY = 0.95  # P(touch) that a missing pair is offered with at most
 ROUNDS = 3  # a second missing contact shows once the first is back
@@ -66,7 +67,7 @@ def find_missing_pairs(
     balance, forces = solved
     price = price_pairs(near, balance, forces, walls, snapshot.present & grains.free, settings)
     sigma = float(np.hypot(2.0**0.5 * snapshot.sigma, overlap))
-    reduced = price / (1.0 + (np.maximum(near.gap, 0.0) / (GAP_SIGMAS * sigma)) ** 2)
+    reduced = price / (1.0 + (np.maximum(near.gap, 0.0) / (GAP_SIGMAS * sigma)) ** GAP_POWER)
     rows = _highest_prices(near, reduced)
     return near.key[rows], np.minimum(reduced[rows] / (1.0 + reduced[rows]), MAX_PROBABILITY)
 
