@@ -5,6 +5,7 @@ python -m tests.app.workbench.journey DIR     # pictures of every step, and what
 
 from __future__ import annotations
 
+import csv
 import sys
 import time
 from collections.abc import Callable
@@ -21,6 +22,7 @@ from tests.app.workbench.hand import fill, go, idle, on_screen
 from tests.app.workbench.laboratory_set import HIDDEN, PIXEL, RULER, LaboratorySet
 
 PATIENCE = 400e3  # [ms] of a run
+MOST_LOOKED_AT = 30  # pairs, until one does not touch
 CLOSE = 8.0  # [px] within which a pose is a rod's
 NEAR = 4.0  # [screen px / px], how far a hand zooms in to be exact
 
@@ -238,10 +240,22 @@ def look_at_contact(journey: Journey) -> str:
     tab = journey.tab
     go(tab, "review")
     tab.wait_for_selector("#next")
-    for _ in range(3):
+    touching = true_contacts(journey)
+    for _ in range(MOST_LOOKED_AT):
         tab.keyboard.press("[")
-    idle(tab)
+        idle(tab)
+        pair = tab.evaluate("review.pair")
+        if (tab.evaluate("workbench.frame"), *sorted((int(pair["i"]), int(pair["j"])))) not in touching:
+            break
     return tab.locator("#bodies").inner_text()
+
+
+def true_contacts(journey: Journey) -> set[tuple[int, int, int]]:
+    """Frames and the page's ids of the rods that touch, as a person with good eyes sees them."""
+    ids = dict(zip(names_of(journey).tolist(), tracks_of(journey).id.tolist(), strict=True))
+    with (journey.made.truth / "truth_contacts.csv").open(newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["j"].isdigit()]
+    return {(int(row["frame"]), *sorted((ids[int(row["i"])], ids[int(row["j"])]))) for row in rows}  # type: ignore[misc]
 
 
 def judge(journey: Journey) -> str:
