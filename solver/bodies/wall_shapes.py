@@ -105,8 +105,10 @@ def beside_wall(endpoints: Array, side: Sides, point: Array, margin: Array) -> N
     return beside if side is None else beside | (side != STRAIGHT)
 
 
-def faces_walls(endpoints: Array, side: Sides, point: Array, radius: Array) -> NDArray[np.bool_]:
-    """Return which walls grains can touch.
+def faces_walls(
+    endpoints: Array, side: Sides, wall: NDArray[np.int64], point: Array, radius: Array
+) -> NDArray[np.bool_]:
+    """Return which grains can touch a wall that is near.
 
     Parameters
     ----------
@@ -114,25 +116,29 @@ def faces_walls(endpoints: Array, side: Sides, point: Array, radius: Array) -> N
         Walls [m].
     side : (w,)
         Shapes of the walls.
-    point : (n, 2)
-        Centres [m].
-    radius : (n,)
-        Radii [m].
+    wall : (k,)
+        Row of the wall of every pair.
+    point : (k, 2)
+        Centre of its grain [m].
+    radius : (k,)
+        Radius of its grain [m].
 
     Returns
     -------
-    (n, w)
-        True beside a wall. A straight wall is taken to go on for a radius past its ends, but neither along another wall
-        that faces the same way, as in a box that is split, nor across a grain, as one beside a footing.
+    (k,)
+        True beside the wall. A straight wall is taken to go on for a radius past its ends, but neither along another
+        wall that faces the same way, as in a box that is split, nor across a grain, as one beside a footing.
     """
-    rows, shape, place = endpoints[None], None if side is None else side[None], point[:, None]
-    near = beside_wall(rows, shape, place, radius[:, None])
-    past = near & ~beside_wall(rows, shape, place, np.zeros(1))
+    rows, shape = endpoints[wall], None if side is None else side[wall]
+    near = beside_wall(rows, shape, point, radius)
+    past = near & ~beside_wall(rows, shape, point, np.zeros(1))
     if not past.any():
         return near
-    across = distance_from_walls(rows, shape, place) < (1.0 - ACROSS) * radius[:, None]
+    across = distance_from_walls(rows, shape, point) < (1.0 - ACROSS) * radius
     another = beside_another(endpoints, side, point)
-    return near & ~(past & (across if another is None else across | another))
+    if another is not None:
+        across |= another[np.arange(len(wall)), wall]
+    return near & ~(past & across)
 
 
 def beside_another(endpoints: Array, side: Sides, point: Array) -> NDArray[np.bool_] | None:

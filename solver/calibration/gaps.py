@@ -195,8 +195,9 @@ def _pairs_of_frame(sequence: MeasuredSequence, k: int, reach: float, wall_reach
     walls, side = sequence.endpoints[k][None], all_sides(sequence.side, sequence.wall_count)[None]
     place, margin = position[rows, None], radius[rows, None]
     gap = wall_distance(walls, side, place)[0] - margin
-    faces = faces_walls(walls[0], side[0], position[rows], radius[rows])
-    grain, wall = np.nonzero(faces & (gap > -margin) & (gap < wall_reach))
+    grain, wall = np.nonzero((gap > -margin) & (gap < wall_reach))
+    faces = faces_walls(walls[0], side[0], wall, position[rows[grain]], radius[rows[grain]])
+    grain, wall = grain[faces], wall[faces]
     return np.concatenate([i, rows[grain]]), np.concatenate([j, wall + sequence.grain_count])
 
 

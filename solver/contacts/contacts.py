@@ -206,8 +206,9 @@ def _wall_pairs(
     """Find pairs of grain and wall; the grain must face the wall, which goes on for one radius past its ends."""
     gap = distance_from_walls(walls.endpoints[None], _row(walls.side), position[:, None]) - radius[:, None]
     near = (gap < threshold) & (gap > -radius[:, None]) & present[:, None]
-    i, w = np.nonzero(near & faces_walls(walls.endpoints, walls.side, position, radius))
-    return i, w
+    i, w = np.nonzero(near)
+    faces = faces_walls(walls.endpoints, walls.side, w, position[i], radius[i])
+    return i[faces], w[faces]
 
 
 def _row(side: Sides) -> Sides:

@@ -11,7 +11,7 @@ MUTANTS = [
         ("np.stack([-self.normal[:, 1], self.normal[:, 0]]", "np.stack([self.normal[:, 1], -self.normal[:, 0]]"),
         ("arm = radius[a] + 0.5 * gap[c]", "arm = radius[a]"),
         ("gap[c] = distance - radius[a] - radius[b]", "gap[c] = distance - 2.0 * radius[a]"),
-        ("near & faces_walls(walls.endpoints, walls.side, position, radius)", "near"),
+        ("return i[faces], w[faces]", "return i, w"),
         ("kept = ~(grains.boundary[i] & grains.boundary[j])", "kept = ~(grains.boundary[i] | grains.boundary[j])"),
         ("x += shift[c, 0]", "x -= shift[c, 0]"),
         (

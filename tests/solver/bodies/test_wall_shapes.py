@@ -212,10 +212,11 @@ def split_side() -> np.ndarray:
 
 def test_a_grain_touches_the_half_of_a_split_side_that_it_is_beside() -> None:
     beside = np.array([[0.19, 0.095], [0.195, 0.105], [0.195, 0.205], [0.195, 0.25]])
-    faces = faces_walls(split_side(), None, beside, np.full(4, 0.01))
+    pair = np.repeat(beside, 2, axis=0), np.full(8, 0.01)  # each with both halves
+    faces = faces_walls(split_side(), None, np.tile([0, 1], 4), *pair).reshape(4, 2)
     assert faces.tolist() == [[True, False], [False, True], [False, True], [False, False]]
     past = np.array([[0.19, 0.105], [0.195, 0.105]])  # of a wall measured too short; beside a wall that ends
-    assert faces_walls(split_side()[:1], None, past, np.full(2, 0.01)).tolist() == [[True], [False]]
+    assert faces_walls(split_side()[:1], None, np.zeros(2, int), past, np.full(2, 0.01)).tolist() == [True, False]
     found = detect_contacts(rods(0.01, 0.01), beside[:2], np.ones(2, bool), Walls.at_rest(split_side()), 1e-4)
     assert (found.j[found.with_wall] - 2).tolist() == [0, 1]
 
