@@ -90,5 +90,5 @@ def test_position_without_a_grain_has_no_quality() -> None:
 
 
 def test_invalid_radii_are_refused() -> None:
-    with pytest.raises(ValueError, match="radii"):
+    with pytest.raises(ValueError, match="at this pixel_size"):
         DetectionSettings(radii=(0.5,))
