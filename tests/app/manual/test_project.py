@@ -60,7 +60,7 @@ def test_the_recipe_of_conda_requires_what_the_package_requires(source):
     run = yaml.safe_load((source / RECIPE).read_text())["requirements"]["run"]
     assert "py-opencv >=4.10.0.84" in run
     text = (source / "pyproject.toml").read_text()
-    (source / "pyproject.toml").write_text(text.replace('"h5py>=3.12"', '"h5py>=9"'))
+    (source / "pyproject.toml").write_text(re.sub(r'"h5py>=[\d.]+"', '"h5py>=9"', text))
     assert write_requirements(source) == [source / RECIPE]
     assert "h5py >=9" in yaml.safe_load((source / RECIPE).read_text())["requirements"]["run"]
 
