@@ -57,11 +57,8 @@ def prepare_ring(
     cell = RingCell(radius, position, ring=wide, core=core, settings=soft, drag=SOFT_DRAG)
     cell.run(np.zeros(SOFT_STEPS))
     cell = RingCell(radius, cell.position, ring=wide, core=core, settings=frictionless, drag=LOADING_DRAG)
-    for _ in range(LOADING_ROUNDS):
-        cell.run(np.zeros(LOADING_STEPS))
-        if cell.unbalance < PREPARED and cell.plate_unbalance < PREPARED:
-            return RingCell(radius, cell.position, ring=cell.ring, core=core, settings=settings)
-    raise UnbalancedError(f"the packing of {count} rods did not come to rest: unbalance {cell.unbalance:.2g}")
+    _let_rest(cell)
+    return RingCell(radius, cell.position, ring=cell.ring, core=core, settings=settings)
 
 
 def prepare_drum(
@@ -92,11 +89,18 @@ def prepare_drum(
     cell = RingCell(radius, position, settings=soft, drag=SOFT_DRAG, **outside)
     cell.run(np.zeros(SOFT_STEPS))
     cell = RingCell(radius, cell.position, settings=frictionless, drag=SETTLING_DRAG, **outside)
+    _let_rest(cell)
+    return RingCell(radius, cell.position, settings=settings, **outside)
+
+
+def _let_rest(cell: RingCell) -> None:
+    """Run until grains and ring are in equilibrium. Raises UnbalancedError."""
     for _ in range(LOADING_ROUNDS):
         cell.run(np.zeros(LOADING_STEPS))
-        if cell.unbalance < PREPARED:
-            return RingCell(radius, cell.position, settings=settings, **outside)
-    raise UnbalancedError(f"the bed of {count} rods did not come to rest: unbalance {cell.unbalance:.2g}")
+        if cell.unbalance < PREPARED and cell.plate_unbalance < PREPARED:
+            return
+    count = cell.grains.count
+    raise UnbalancedError(f"the packing of {count} rods did not come to rest: unbalance {cell.unbalance:.2g}")
 
 
 def _scatter(count: int, rng: np.random.Generator, core: float, ring: float) -> Array:

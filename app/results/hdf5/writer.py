@@ -142,8 +142,8 @@ def _write_whole(store: h5py.File, columns: Columns) -> None:
 def _write_rows(entry: Entry, dataset: h5py.Dataset, first: int, rows: np.ndarray) -> None:
     """Write rows from a number on, which is a multiple of the rows of a block where the dataset is compressed.
 
-    A tenth of the time of HDF5's own deflate, whose form it has: blocks are shuffled and compressed before HDF5 stores
-    them.
+    A seventh of the time of HDF5's own deflate, whose form it has: blocks are shuffled and compressed before HDF5
+    stores them.
     """
     chunks = dataset.chunks
     if chunks is None:

@@ -16,7 +16,7 @@ from ...solver.dem.ring_cell import CIRCLE_NAMES, CIRCLE_SIDES, RingCell
 from ..dense_packing import prepare_packing
 from ..placement import place_in_picture, tilt_box
 from ..ring_packing import prepare_drum
-from .loading_paths import BOX_HEIGHT, HEAP_PRESSURE, MARGIN, RESTS, LoadingPath
+from .loading_paths import BOX_HEIGHT, HEAP_PRESSURE, MARGIN, LoadingPath, rested
 
 BOX_ASPECT, BED_ASPECT = 0.7, 0.6  # height over width
 MOBILISED = 8  # steps of the motion before the first photograph
@@ -85,7 +85,7 @@ def _prepare_box(loading: LoadingPath, grains: int, rng: np.random.Generator) ->
     """Return a packing at rest under the plate's pressure, in a box that is split at half its height."""
     packed = prepare_packing(grains, rng, loading.settings, aspect=BOX_ASPECT, sizes=loading.sizes)
     size = BoxSize(packed.width, packed.height, 0.5 * packed.height)
-    return _rested(BoxCell(packed.grains.radius, packed.position, size, loading.settings))
+    return rested(BoxCell(packed.grains.radius, packed.position, size, loading.settings))
 
 
 def _prepare_footing(loading: LoadingPath, grains: int, rng: np.random.Generator) -> BoxCell:
@@ -96,7 +96,7 @@ def _prepare_footing(loading: LoadingPath, grains: int, rng: np.random.Generator
     under = np.abs(position[:, 0] - middle) < 0.5 * width
     surface = float((position[:, 1] + radius)[under].max())
     size = BoxSize(bed.width, BOX_HEIGHT * bed.height)
-    return _rested(BoxCell(radius, position, size, loading.settings, tool=Tool(middle, surface, width=width)))
+    return rested(BoxCell(radius, position, size, loading.settings, tool=Tool(middle, surface, width=width)))
 
 
 def _prepare_intruder(loading: LoadingPath, grains: int, rng: np.random.Generator) -> BoxCell:
@@ -107,7 +107,7 @@ def _prepare_intruder(loading: LoadingPath, grains: int, rng: np.random.Generato
     centre = np.array([0.4 * bed.width, 0.45 * float((position[:, 1] + radius).max())])
     beside = np.hypot(*(position - centre).T) >= disc + radius
     size = BoxSize(bed.width, BOX_HEIGHT * bed.height)
-    return _rested(
+    return rested(
         BoxCell(radius[beside], position[beside], size, loading.settings, tool=Tool(*centre.tolist(), radius=disc))
     )
 
@@ -117,15 +117,7 @@ def _prepare_bed(loading: LoadingPath, grains: int, rng: np.random.Generator) ->
     light = replace(loading.settings, pressure=HEAP_PRESSURE, gravity=(0.0, 0.0))
     packed = prepare_packing(grains, rng, light, aspect=BED_ASPECT, sizes=loading.sizes)
     size = BoxSize(packed.width, BOX_HEIGHT * packed.height)
-    return _rested(BoxCell(packed.grains.radius, packed.position, size, loading.settings))
-
-
-def _rested(cell: BoxCell) -> BoxCell:
-    for _ in range(RESTS):
-        cell.rest()
-        if cell.unbalance < cell.settings.rest:
-            break
-    return cell
+    return rested(BoxCell(packed.grains.radius, packed.position, size, loading.settings))
 
 
 def _prepare_drum(loading: LoadingPath, grains: int, rng: np.random.Generator) -> RingCell:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ...solver.bodies.grains import Array
 from ...solver.dem.dem_truth import DemFrame, DemSettings, DemTruth
 from ...solver.dem.ring_cell import CIRCLE_NAMES, CIRCLE_SIDES, RingCell
 from ...solver.dem.shear_cell import FrameSize, ShearCell, shear_photographs
+from ...solver.dem.simulation import Simulation
 from ..dense_packing import choose_radii, prepare_packing
 from ..placement import cut_sides, place_in_picture, tilt_box
 from ..ring_packing import prepare_ring
@@ -27,6 +28,7 @@ LOAD_AMPLITUDE, LOAD_PERIOD = 0.4, 8  # of oscillating loads: over the pressure,
 CORE_ROTATION = 0.02  # [rad] of the core per photograph
 AMPLITUDE = 4  # of cyclic shear [steps]
 RESTS = 8  # relaxations of a heap, at most
+Cell = TypeVar("Cell", bound=Simulation)
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,8 +217,13 @@ def _prepare_heap(loading: LoadingPath, grains: int, rng: np.random.Generator) -
         FrameSize(cell.width, BOX_HEIGHT * cell.height, SPAN * cell.width),
         loading.settings,
     )
+    return rested(heap)
+
+
+def rested(cell: Cell) -> Cell:
+    """Relax a packing under its weight, RESTS times at most, and return it."""
     for _ in range(RESTS):
-        heap.rest()
-        if heap.unbalance < loading.settings.rest:
+        cell.rest()
+        if cell.unbalance < cell.settings.rest:
             break
-    return heap
+    return cell
