@@ -22,6 +22,8 @@ FACTORS = {
 _NUMBER = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s.,].*)?")
 _LINE = re.compile(r"at line (\d+)")
 _ASSIGNMENT = re.compile(r"\s*([\w.-]+)\s*=\s*([^#]*?)\s*(?:#.*)?")
+SOLID_DENSITIES = (10.0, 2.3e4)  # [kg/m³] the lightest foams for packaging; osmium has 22 590
+DENSITIES_IN_OTHER_UNITS = (1e3, 1e-3)  # g/cm³ and g/m³, as factors to kg/m³
 MIN_SIMILARITY = 0.7  # of a word that the user may have meant
 DIGITS = 12  # of a converted number
 
@@ -67,8 +69,12 @@ def correct_value(name: str, value: Any, kind: str, unit: str) -> str | None:
     if kind.startswith("list of number"):
         numbers = _read_list(value, unit)
         return None if numbers is None else f"{name} = [{', '.join(f'{each!r}' for each in numbers)}]"
+    low, high = SOLID_DENSITIES
     if kind.startswith("number") and isinstance(value, str) and number is not None:
         return f"{name} = {number!r}"
+    if unit == "kg/m³" and isinstance(number, int | float) and not low <= number <= high:
+        right = (float(f"{number * factor:.{DIGITS}g}") for factor in DENSITIES_IN_OTHER_UNITS)
+        return next((f"{name} = {each!r}" for each in right if low <= each <= high), None)
     if kind == "text" and name == "name" and isinstance(value, int | float):
         return f'{name} = "{value}"'
     return None

@@ -13,6 +13,7 @@ from ...solver.bodies.rods import RodMaterial
 from ...solver.boundary.boundary_correction import BoundarySettings
 from ...solver.calibration.priors import CalibrationSettings
 from ...solver.sequence.settings import SequenceSettings
+from .corrections import SOLID_DENSITIES
 from .section import Finite, Frame, Pixels, Section, Switch, above, between, key, whole
 
 RODS, CALIBRATION, SEQUENCE = RodMaterial(), CalibrationSettings(), SequenceSettings()
@@ -22,7 +23,9 @@ CHAIN, BOUNDARY = SEQUENCE.chain, BoundarySettings()
 class MaterialSection(Section):
     """Properties common to all rods."""
 
-    density: Annotated[float, between(1, 3e4)] = key("Density of the rods.", unit="kg/m³", default=RODS.density)
+    density: Annotated[float, between(*SOLID_DENSITIES)] = key(
+        "Density of the rods.", unit="kg/m³", default=RODS.density
+    )
     length: Annotated[float, between(1e-6, 10.0)] = key(
         "Length of the rods, which converts pressures to forces.", unit="m", default=RODS.length
     )
