@@ -84,9 +84,10 @@ def hold_folder(folder: Path, notify: Callable[[str], None]) -> Iterator[None]:
     made = [each for each in (folder, *folder.parents) if not each.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     lock = folder / LOCK
-    handle, dead = _take(lock)
+    this = Holder.this()
+    handle, dead = _take(lock, this)
     ended = threading.Event()
-    renewal = threading.Thread(target=_renew, args=(handle, ended, threading.get_ident()), daemon=True)
+    renewal = threading.Thread(target=_renew, args=(handle, this, ended, threading.get_ident()), daemon=True)
     _held.add(handle)
     renewal.start()
     try:
@@ -98,7 +99,7 @@ def hold_folder(folder: Path, notify: Callable[[str], None]) -> Iterator[None]:
     finally:
         ended.set()
         renewal.join()
-        if not _is_taken(handle):
+        if not _is_taken(handle, this):
             lock.unlink(missing_ok=True)
         _held.discard(handle)
         os.close(handle)
@@ -122,8 +123,8 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_close_in_child)
 
 
-def _take(lock: Path) -> tuple[int, Holder | None]:
-    """Open a lock and write the current process into it; return the dead process that left the lock, if any."""
+def _take(lock: Path, this: Holder) -> tuple[int, Holder | None]:
+    """Open a lock and write this process into it; return the dead process that left the lock, if any."""
     while True:
         refuse_link(lock)  # the file at its end would be emptied
         handle = os.open(lock, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
@@ -141,7 +142,7 @@ def _take(lock: Path) -> tuple[int, Holder | None]:
                 _refuse_living(lock, handle, holder)
             os.ftruncate(handle, 0)
             os.lseek(handle, 0, os.SEEK_SET)
-            os.write(handle, json.dumps(asdict(Holder.this())).encode())
+            os.write(handle, json.dumps(asdict(this)).encode())
         except BaseException:
             with suppress(OSError):
                 os.close(handle)
@@ -166,10 +167,10 @@ class _TakenOver(BaseException):
     """Ends the block of a thread whose folder another process took over; no handler of errors may go on."""
 
 
-def _renew(handle: int, ended: threading.Event, thread: int) -> None:
+def _renew(handle: int, this: Holder, ended: threading.Event, thread: int) -> None:
     """Renew the lease until the end of the block; end the block where another process took the folder over."""
     while not ended.wait(RENEWAL):
-        if _is_taken(handle):
+        if _is_taken(handle, this):
             # Not the signal of Ctrl+C, which a process in the background ignores.
             ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(_TakenOver))
             return
@@ -177,13 +178,16 @@ def _renew(handle: int, ended: threading.Event, thread: int) -> None:
             os.utime(handle)
 
 
-def _is_taken(handle: int) -> bool:
-    """Whether another process stands in a lock that this one took: its lease expired while this one was suspended."""
+def _is_taken(handle: int, this: Holder) -> bool:
+    """Whether another process stands in a lock that this one took: its lease expired while this one was suspended.
+
+    It is compared with what was written: an emulator (QEMU) gives each thread another start of its process.
+    """
     try:
         holder = _read(handle)
     except OSError:  # the disk is away for a while
         return False
-    return holder is not None and holder != Holder.this()
+    return holder is not None and holder != this
 
 
 def _read(handle: int) -> Holder | None:

@@ -162,9 +162,10 @@ SCHEMA: tuple[Entity, ...] = (
            _of("TextDocument", "text", "media_type"), When.START),
     Entity(entities.GAPS, "contact points, colour by gap", _POINTS | {"gap_um", "grain_a", "body_b"}, When.START),
     Entity(entities.NEW_CONTACTS, "contacts that the frame before did not have", _STRIPS, When.START),
-    Entity(entities.LOST_CONTACTS, "contacts of the frame before that are gone", _STRIPS, When.START),
+    Entity(entities.LOST_CONTACTS, "contacts of the frame before that are gone, in two parts", _STRIPS, When.START),
     Entity(
-        entities.VERDICTS, "contacts that a reviewer added or forbade", _STRIPS | {"source", "grain_a", "body_b"},
+        entities.VERDICTS, "contacts that a reviewer added, or forbade (in two parts)",
+        _STRIPS | {"source", "grain_a", "body_b"},
         When.START,
     ),
     Entity(entities.SCALE_BAR, "a bar of a round length", _STRIPS, When.STATIC),

@@ -17,6 +17,7 @@ from ..look.scene import Scene
 from ..look.values import nullable
 
 GAP_RANGE_FRACTION = 0.004  # of the mean radius: the gap at both ends of the colour ramp
+END_FRACTION = 0.3  # of a line in two parts: each end
 
 _RAMP = packed(GAP_RAMP)
 
@@ -47,7 +48,7 @@ def log_changes(
     else:
         new = contacts.select(~are_among(contacts.key, previous.contacts.key))
         ended = previous.contacts.select(~are_among(previous.contacts.key, contacts.key))
-        lost = _branches_now(scene, clock.frame, ended)
+        lost = broken_lines(_branches_now(scene, clock.frame, ended))
     for path, strips, colour in (
         (entities.NEW_CONTACTS, scene.branches(clock.frame, new), NEW_CONTACT),
         (entities.LOST_CONTACTS, lost, LOST),
@@ -61,6 +62,14 @@ def log_changes(
                 draw_order=25.0,
             ),
         )
+
+
+def broken_lines(lines: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the two ends (2 c, 2, 2) of lines (c, 2, 2): the shape of pairs without a contact."""
+    start, end = lines[:, 0], lines[:, 1]
+    arm = END_FRACTION * (end - start)
+    halves = np.stack([start, start + arm], axis=1), np.stack([end - arm, end], axis=1)
+    return np.concatenate(halves).astype(np.float32)
 
 
 def gap_range(scene: Scene) -> float:

@@ -132,7 +132,7 @@ def _log_gap_legend(stream: rr.RecordingStream, scene: Scene) -> None:
     micrometres = 1e6 * reach
     texts = [(0.0, f"overlap {micrometres:g}"), (0.5, "touching"), (1.0, f"open {micrometres:g} µm")]
     notes = [
-        (0.0, "new", NEW_CONTACT), (0.25, "lost", LOST), (0.57, "added", ADDED),
-        (0.97, "forbidden", FORBIDDEN),
+        (0.0, "new", NEW_CONTACT), (0.25, "- - lost", LOST), (0.57, "added", ADDED),
+        (0.97, "- - forbidden", FORBIDDEN),
     ]  # fmt: skip
     log_legend_texts(stream, scene.canvas, entities.GAP_LEGEND_TICKS, texts, notes)

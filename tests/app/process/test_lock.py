@@ -111,6 +111,19 @@ def test_a_process_that_was_suspended_for_longer_than_its_lease_ends_and_leaves_
     assert json.loads((tmp_path / LOCK).read_text())["host"] == "far"
 
 
+def test_a_start_that_another_thread_reads_otherwise_is_no_other_process(tmp_path, monkeypatch):
+    monkeypatch.setattr(locks, "RENEWAL", 0.01)
+    this = locks.threading.get_ident()  # QEMU, which runs programs of other processors, gives each thread its own start
+    monkeypatch.setattr(locks, "_start_time", lambda _: str(locks.threading.get_ident() == this))
+    with hold_folder(tmp_path, print):
+        os.utime(tmp_path / LOCK, (0.0, 0.0))
+        for _ in range(200):
+            if (tmp_path / LOCK).stat().st_mtime > 0.0:
+                break
+            locks.threading.Event().wait(0.01)
+        assert (tmp_path / LOCK).stat().st_mtime > 0.0
+
+
 def test_a_process_holds_a_folder_once(tmp_path):
     with (
         hold_folder(tmp_path, print),

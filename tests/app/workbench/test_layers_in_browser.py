@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
+from rodsight.recording.curve_layers.settling import STATUS_COLOURS
 from rodsight.results.hdf5.store import load_results, origin_of, save_results
 
 from tests.app.recording.fake_results import with_fringes
@@ -166,11 +167,13 @@ def seen_by(colours: list[str], matrix: list[list[float]]) -> np.ndarray:
 @pytest.mark.parametrize("scheme", ["dark", "light"])
 def test_colours_of_every_layer_differ_for_everybody(tab: Page, scheme: Literal["dark", "light"]):
     tab.emulate_media(color_scheme=scheme)
-    ramps, states, series, tones = tab.evaluate("""async () => {
+    ramps, states, series, tones, classes, kinds = tab.evaluate("""async () => {
         const { look } = await import("/page/layers/colours.js"), { STATES } = await import("/page/layers/rods.js");
         const { TONES } = await import("/page/time/strip.js"), { colour } = await import("/page/dom.js");
         const series = [1, 2, 3, 4].map((n) => colour(`series-${n}`));
-        return [look.ramps, Object.values(STATES), series, Object.values(TONES)];
+        const { CLASS_COLOURS } = await import("/page/steps/rods.js");
+        const { PARTS } = await import("/page/parts/agreement.js");
+        return [look.ramps, Object.values(STATES), series, TONES, CLASS_COLOURS, PARTS.map(([, , shade]) => shade)];
     }""")  # fmt: skip
     for name, matrix in {"all": np.eye(3).tolist(), **DEFICIENCIES}.items():
         for ramp, colours in ramps.items():
@@ -179,11 +182,12 @@ def test_colours_of_every_layer_differ_for_everybody(tab: Page, scheme: Literal[
             assert (lightness > -0.6).all() or (lightness < 0.6).all(), (name, ramp)  # monotonic: read in grey
             ends = np.linalg.norm(lab[-1] - lab[0])
             assert ends > 2.5 * APART, (name, ramp)
-        for group in (states, series):
+        for group in (states, series, classes, kinds):
             lab = seen_by(group, matrix)
             apart = np.linalg.norm(lab[:, None] - lab[None], axis=2)[~np.eye(len(lab), dtype=bool)]
             assert apart.min() > APART, (name, group)
-    assert len(set(tones)) == len(tones)  # statuses are named beside their colour
+    # Those of the recording, which tests/app/recording/look/test_palette.py compares in every vision.
+    assert tones == {status.name.lower(): "#" + bytes(shade[:3]).hex() for status, shade in STATUS_COLOURS.items()}
 
 
 def test_marks_of_pairs_differ_by_shape_where_their_colours_may_not(tab: Page):

@@ -4,7 +4,7 @@ import { request, chart, colour, digits, h } from "/page/dom.js";
 import { pairName } from "/page/parts/verdicts.js";
 
 // Contacts that both see, the detector alone, the reviewers alone; the rest of the bar neither sees.
-const PARTS = [["hits", "both", "#2fbf93"], ["false", "detector only", "#d55e00"], ["missed", "reviewers only", "#f0e442"], ["rejected", "neither", "#56b4e9"]];
+export const PARTS = [["hits", "both", "#1c7afa"], ["false", "detector only", "#e581b0"], ["missed", "reviewers only", "#d8c641"], ["rejected", "neither", "#9bffb4"]];
 
 /** Closed at first; opened, the numbers are requested. go(pair) shows a pair. */
 export function agreementSection(app, state, go) {

@@ -3,7 +3,7 @@
 import { request, chart, colour, digits, fact, h, parse, strokeCircles, notify } from "/page/dom.js";
 import { siOf, measured, typed, unit, within } from "/page/units.js";
 
-export const CLASS_COLOURS = ["#56b4e9", "#e69f00", "#2fbf93", "#cc79a7", "#f0e442", "#d55e00", "#0072b2", "#999999"];
+export const CLASS_COLOURS = ["#d8c641", "#1c7afa", "#9bffb4", "#e581b0", "#b4a5ff", "#b43c4b", "#695aa5", "#d20000"];
 let chosen = null, held = null, quality = null, typedRadii = null, proposed = null;
 
 export const rods = {

@@ -45,7 +45,7 @@ export function showLost(app, poses) {
         c.fillStyle = style; c.fillRect(k * step + 0.5, low - tall, Math.max(step - 1, 1), tall); low -= tall;
       }
     });
-    for (const each of poses?.corrections ?? []) { c.fillStyle = TONES.settled; c.beginPath(); c.arc((each.frame + 0.5) * step, 7, 3.5, 0, 7); c.fill(); }
+    for (const each of poses?.corrections ?? []) { c.fillStyle = colour("good"); c.beginPath(); c.arc((each.frame + 0.5) * step, 7, 3.5, 0, 7); c.fill(); }
     c.strokeStyle = colour("ink"); c.lineWidth = 2; c.strokeRect(app.frame * step + 1, 1, Math.max(step - 2, 2), height - 2);
   });
 }

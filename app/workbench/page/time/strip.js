@@ -2,7 +2,8 @@
 
 import { colour } from "/page/dom.js";
 
-export const TONES = { settled: "#2fbf93", settling: "#56b4e9", rearranging: "#e69f00", suspect: "#d55e00", failed: "#b02a6f", reset: "#8a8f9a" };
+// Those of the recording (STATUS_COLOURS), which differ in every kind of colour vision.
+export const TONES = { reset: "#bcb4f4", suspect: "#e56d7a", rearranging: "#f9dd73", settling: "#3288e7", settled: "#0f6a31", failed: "#52102c" };
 
 /** A press on a canvas, and a movement after it, go to the photograph that is there. */
 export function dragFrames(app, canvas, count) {
