@@ -20,8 +20,10 @@ from rodsight.synthetic.synthesis import SynthesisSettings, synthesize
 from tests.browser import FLAGS, SECONDS, SEEN, find_chromium
 from tests.scheduling import rank_of, schedule_by_folder
 from tests.shapes import check_shapes
+from tests.sharing import made_once
 
-FAST = "not slow and not screen"  # the marks of the fast tests, as in pyproject.toml
+FAST = "not thorough and not slow and not screen"  # the marks of the fast tests, as in pyproject.toml
+TWO_PROCESSES = (FAST, "thorough", "not slow and not screen")  # these lanes, and both in one run, as in .ci/run
 
 check_shapes("rodsight.solver")
 
@@ -46,9 +48,8 @@ def signals_reach_children() -> None:
 @pytest.fixture(scope="session")
 def made_tracks(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small tracked experiment with truth; not to be written to."""
-    folder = tmp_path_factory.mktemp("synthetic") / "tracked"
-    synthesize(folder, SynthesisSettings(grains=40, frames=5, photographs=False, noise=1e-5, seed=1))
-    return folder
+    settings = SynthesisSettings(grains=40, frames=5, photographs=False, noise=1e-5, seed=1)
+    return made_once(tmp_path_factory, "tracked", lambda folder: synthesize(folder, settings))
 
 
 @pytest.fixture(scope="session")
@@ -71,9 +72,8 @@ def tracked(made_tracks: Path, tmp_path: Path) -> Path:
 @pytest.fixture(scope="session")
 def made_photographs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small photographed experiment with truth; not to be written to."""
-    folder = tmp_path_factory.mktemp("synthetic") / "photographed"
-    synthesize(folder, SynthesisSettings(grains=30, frames=4, seed=2))
-    return folder
+    settings = SynthesisSettings(grains=30, frames=4, seed=2)
+    return made_once(tmp_path_factory, "photographed", lambda folder: synthesize(folder, settings))
 
 
 @pytest.fixture(scope="session")
@@ -101,8 +101,12 @@ def page(browser: Browser) -> Iterator[Page]:
     context.close()
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Run tests with a browser last: its driver keeps an event loop in this thread until the end."""
+    if config.option.markexpr == "thorough":  # tests of a thorough file with a lane of their own belong to that one
+        others = {each for each in items if any(map(each.get_closest_marker, ("slow", "screen")))}
+        items[:] = [each for each in items if each not in others]
+        config.hook.pytest_deselected(items=list(others))
     items.sort(key=lambda item: ("browser" in getattr(item, "fixturenames", ()), rank_of(item.nodeid)))
 
 
@@ -114,9 +118,9 @@ def pytest_collection_finish() -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Run all fast tests in two processes; chosen tests, other lanes and benchmarks in this process alone."""
+    """Run the whole fast or thorough lane in two processes; chosen tests, other lanes and benchmarks in this one."""
     whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS and not config.option.benchmark_only
-    return min(2, os.cpu_count() or 1) if whole and config.option.markexpr == FAST else 0
+    return min(2, os.cpu_count() or 1) if whole and config.option.markexpr in TWO_PROCESSES else 0
 
 
 @pytest.hookimpl(optionalhook=True)

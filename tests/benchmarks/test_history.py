@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from tests.benchmarks import growth, history
 from tests.benchmarks.timing import Duration, Row, duration_ratios, in_processor_time
 
@@ -23,6 +25,7 @@ def test_every_run_appends_median_and_range_of_rows_with_rounds(tmp_path):
     assert entries[1][4:] == ("of another", 0.75, 0.5, 1.0, 2)
 
 
+@pytest.mark.thorough
 def test_the_plot_of_the_history_is_up_to_date(tmp_path):
     entries = history.read()
     assert len(entries) >= 2

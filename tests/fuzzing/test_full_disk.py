@@ -149,6 +149,7 @@ def problems_at(limits: Iterable[int], name: str, places, whole, folder: Path) -
     return problems if failed else [*problems, f"{name}: no limit of {limits} stopped it"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", [name for name in SOLVED if name not in HEAVY + SLOW])
 def test_a_writer_leaves_whole_files_where_files_cannot_grow(name, places, whole, tmp_path):
     assert problems_at((SMALL.get(name, LIMIT),), name, places, whole, tmp_path) == []

@@ -12,12 +12,14 @@ from .table import MUTATIONS, note
 QUICK = 63
 
 
+@pytest.mark.thorough
 def test_some_corrupted_inputs_do_no_harm(originals):
     count, problems = run_all(make_cases(originals, QUICK, SEED))
     assert problems == []
     assert count == QUICK
 
 
+@pytest.mark.thorough
 def test_the_shortcut_runs_commands_like_the_parser(originals):
     for _, make in list(make_cases(originals, QUICK, SEED))[::8]:
         arguments, _ = make()

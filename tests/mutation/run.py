@@ -173,7 +173,9 @@ def _run_here(tree: Path, tests: Sequence[str], compile_kernels: bool, own_kerne
     if not own_kernels:
         os.environ["NUMBA_CACHE_DIR"] = numba.config.CACHE_DIR = str(tree / KERNELS)
     options = ["-x", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=no", "--hypothesis-profile=mutants", *tests]
-    if not compile_kernels:
+    if compile_kernels:
+        options += ["-m", "not slow and not screen"]  # the thorough tests, too
+    else:
         numba.config.DISABLE_JIT = True
         options += ["-m", "unit and not slow"]
     sys.exit(pytest.main(options))

@@ -81,6 +81,7 @@ def test_an_error_in_the_table_is_named_before_any_run(text, named, table, tmp_p
     assert not (tmp_path / "all").exists()
 
 
+@pytest.mark.thorough
 def test_all_runs_are_collected_in_joint_tables(done):
     folder, cases, outcomes = done
     rows = collect(folder, cases, outcomes)
@@ -101,6 +102,7 @@ def test_all_runs_are_collected_in_joint_tables(done):
     assert page.count("<svg") == 3  # friction angle and trust over frames, and results over the coefficient of friction
 
 
+@pytest.mark.thorough
 def test_finished_runs_are_reused(done):
     folder, cases, outcomes = done
     before = (folder / cases[0].name / "results.h5").stat().st_mtime_ns

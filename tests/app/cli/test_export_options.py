@@ -44,6 +44,7 @@ def test_options_of_the_chosen_kind_are_used(run, tmp_path, capsys):
     assert str(tmp_path) in capsys.readouterr().out
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("frames", "named"), [("0:1", "/: rose_000000.png."), (None, "/: 2 pictures, rose_000000")])
 def test_the_pictures_that_were_written_are_named(run, frames, named, tmp_path, capsys):
     (run / "recording.rrd").touch()  # figures are drawn from the results

@@ -52,6 +52,7 @@ def test_a_black_photograph_fails_its_own_frame(made_photographs, tmp_path, caps
     assert sorted(set(walls)) == [0, 1, 3]
 
 
+@pytest.mark.thorough
 def test_a_frame_that_cannot_be_solved_is_reported_and_its_traceback_logged(tracked, tmp_path, capsys, monkeypatch):
     solve_sequence = solve_frames.solve_sequence
 

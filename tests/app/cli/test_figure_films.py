@@ -22,6 +22,7 @@ PLAY = """async source => {
 }"""
 
 
+@pytest.mark.thorough
 def test_pictures_of_a_figure_have_the_width_that_was_requested(examples, tmp_path, capsys):
     run = str(examples / "runs/shear")
     assert rodsight("export", "pictures", run, "--figure", "forces", "--frames", "3:5", "--out", str(tmp_path)) == 0

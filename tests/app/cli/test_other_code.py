@@ -61,6 +61,7 @@ def test_results_of_the_same_code_are_used_again(out, made_tracks, capsys):
     assert "computed anew" not in capsys.readouterr().out
 
 
+@pytest.mark.thorough
 def test_results_of_other_code_are_solved_anew_and_one_line_states_why(out, made_tracks, monkeypatch, capsys):
     before = created(out)
     other_code(monkeypatch)
@@ -71,6 +72,7 @@ def test_results_of_other_code_are_solved_anew_and_one_line_states_why(out, made
     assert created(out).startswith("other ")
 
 
+@pytest.mark.thorough
 def test_results_of_another_library_are_solved_anew_and_a_line_names_both(out, made_tracks, monkeypatch, capsys):
     stated = run_folder.library_versions()
     monkeypatch.setattr(run_folder, "library_versions", lambda: stated | {"numpy": "99.0"})
@@ -122,6 +124,7 @@ WITHOUT_EFFECT = (
 OF_TRUTH = ("results/truth.py",)  # read, and compared with results by name only
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("stage", "of"), [(TRACKING, "made_photographs"), (FORCES, "made_tracks")], ids=["tracks", "forces"]
 )

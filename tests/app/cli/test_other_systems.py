@@ -55,6 +55,7 @@ print(len(VerdictLog(log.file).entries()))
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "what", ["track", "check", "verdict", pytest.param("solve", marks=pytest.mark.screen)]
 )  # solve compiles anew, without the number of cores
@@ -73,6 +74,7 @@ def run(code: str, *arguments: object) -> subprocess.CompletedProcess[str]:
     return done
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("folder", ["made_tracks", pytest.param("made_photographs", marks=pytest.mark.slow)])
 def test_a_node_of_a_cluster_solves_without_the_other_packages(folder, tmp_path, request):
     run(f"{HIDE}\n{COMMANDS['solve']}", request.getfixturevalue(folder), tmp_path / "run")

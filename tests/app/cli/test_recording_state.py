@@ -20,6 +20,8 @@ from rodsight.workbench.service.project import Project
 from tests.app.cli.test_out_of_date import FEW, PRESSURE, pressure
 from tests.program import rodsight
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture(scope="module")
 def made(made_tracks: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -33,6 +33,7 @@ def sent(made: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(made / "sent", tmp_path / "sent"))
 
 
+@pytest.mark.thorough
 def test_it_is_scored_as_with_its_experiment(made, sent, capsys):
     summary = json.loads((made / "run" / "summary.json").read_text())
     capsys.readouterr()
@@ -43,6 +44,7 @@ def test_it_is_scored_as_with_its_experiment(made, sent, capsys):
     assert "r(f_n) over all frames" in capsys.readouterr().out
 
 
+@pytest.mark.thorough
 def test_it_is_recorded_without_photographs(sent, capsys):
     assert rodsight("record", sent / "results.h5", "--sweeps", "none", "--quiet") == 0
     assert (sent / "recording.rrd").stat().st_size > 0
@@ -50,6 +52,7 @@ def test_it_is_recorded_without_photographs(sent, capsys):
     assert "--out" in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("what", ["tables", "vtk", "graph", "figures"])
 def test_it_is_exported(sent, what):
     options = ("--formats", "png") if what == "figures" else ()
@@ -57,12 +60,14 @@ def test_it_is_exported(sent, what):
     assert list((sent / what).iterdir())
 
 
+@pytest.mark.thorough
 def test_it_is_compared_and_opened(sent, tmp_path):
     file = sent / "results.h5"
     assert rodsight("compare", file, file, "--out", tmp_path / "both.rrd") == 0
     assert len(product.open(file).contacts(frame=1))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("version", [1, 2])
 def test_files_of_earlier_schemas_stand_alone_too(tmp_path, version):
     file = unpack(version, tmp_path)

@@ -74,6 +74,7 @@ def test_the_results_file_has_the_public_layout(tracked, tmp_path, capsys):
         assert "friction = 0.25" in store.attrs["configuration"]
 
 
+@pytest.mark.thorough
 def test_results_read_back_as_they_were_stored(tracked, tmp_path, capsys):
     from rodsight.results.checkpoint import flatten
     from rodsight.results.hdf5.store import Provenance, save_results
@@ -94,6 +95,7 @@ def test_results_read_back_as_they_were_stored(tracked, tmp_path, capsys):
             assert equal, name
 
 
+@pytest.mark.thorough
 def test_the_same_command_finds_everything_done(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("run", str(tracked), "--out", str(out), *FEW) == 0
@@ -132,6 +134,7 @@ def test_an_interrupt_ends_with_130_and_a_hint(tracked, tmp_path, monkeypatch, c
     assert "resumes" in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 def test_photographs_are_tracked_and_solved(made_photographs, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("run", str(made_photographs), "--out", str(out)) == 0
@@ -144,6 +147,7 @@ def test_photographs_are_tracked_and_solved(made_photographs, tmp_path, capsys):
     assert summary["accuracy"]["contact_recall"][3] == 1.0
 
 
+@pytest.mark.thorough
 def test_a_range_of_frames_is_scored_against_its_own_truth(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("run", str(tracked), "--out", str(out), "--frames", "1:5", "--quiet") == 0
@@ -160,6 +164,7 @@ def test_a_range_of_frames_is_scored_against_its_own_truth(tracked, tmp_path, ca
     assert baselines["r_ours"][3] > baselines["r_uniform"][3] > 0.2
 
 
+@pytest.mark.thorough
 def test_scoring_the_truth_against_itself_is_perfect(tracked, tmp_path, capsys):
     from rodsight.results.truth import accuracy
     from rodsight.results.truth import score as score_frames
@@ -190,6 +195,7 @@ def test_check_describes_the_input_and_writes_nothing(tracked, capsys, monkeypat
     assert not Path("runs").exists()
 
 
+@pytest.mark.thorough
 def test_check_predicts_the_accuracy_from_the_first_photographs(made_photographs, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert rodsight("check", made_photographs) == 0
@@ -209,6 +215,7 @@ def test_every_command_has_help_with_an_example(command, capsys):
     assert f"Example: rodsight {command}" in " ".join(capsys.readouterr().out.split())
 
 
+@pytest.mark.thorough
 def test_imposed_walls_alone_give_forces_up_to_a_scale(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     text = (tracked / "experiment.toml").read_text()
@@ -220,6 +227,7 @@ def test_imposed_walls_alone_give_forces_up_to_a_scale(tracked, tmp_path, capsys
     assert summary["accuracy"]["r_fn"][-1] > 0.7
 
 
+@pytest.mark.thorough
 def test_recorded_wall_forces_are_compared_with_inferred_ones(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("solve", str(tracked), "--out", str(out)) == 0

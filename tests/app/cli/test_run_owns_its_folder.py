@@ -137,6 +137,7 @@ def test_a_damaged_piece_is_reported_and_computed_again(tracked, tmp_path, monke
     assert np.array_equal(forces(out), forces(tmp_path / "whole"))
 
 
+@pytest.mark.thorough
 def test_damaged_results_are_not_read(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("solve", tracked, "--out", out, *FEW) == 0
@@ -188,6 +189,7 @@ def test_a_verdict_given_during_a_run_is_used_by_the_next_run_only(tracked, tmp_
     assert load_results(out / "results.h5").frames[3].status.name == "RESET"
 
 
+@pytest.mark.thorough
 def test_partial_files_of_a_stopped_run_are_removed_and_no_others(tracked, tmp_path):
     out = tmp_path / "out"
     (out / ".unfinished" / "solving").mkdir(parents=True)
@@ -215,6 +217,7 @@ def test_pieces_left_beside_complete_results_are_removed(tracked, tmp_path, monk
     assert not (tmp_path / "out" / ".unfinished").exists()
 
 
+@pytest.mark.thorough
 def test_results_contain_no_names_of_persons_or_places(tracked, tmp_path, monkeypatch):
     monkeypatch.setattr(socket, "gethostname", lambda: "machine-of-somebody")
     home = Path(shutil.move(tracked, tmp_path / "of_somebody"))

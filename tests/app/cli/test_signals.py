@@ -103,6 +103,7 @@ def test_workers_end_with_a_process_that_is_killed(tmp_path):
     run.communicate(timeout=30)  # the pipe is open until the last worker has ended
 
 
+@pytest.mark.thorough
 def test_a_closed_pipe_is_no_error():
     run = subprocess.Popen([*RODSIGHT, "settings"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert run.stdout is not None

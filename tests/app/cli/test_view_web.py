@@ -5,9 +5,12 @@ import subprocess
 import sys
 import urllib.request
 
+import pytest
+
 from tests.app.recording.fake_results import make_results
 
 
+@pytest.mark.thorough
 def test_the_page_is_there_until_ctrl_c_and_a_second_call_takes_another_port(tmp_path):
     from rodsight.recording.files.finished_run import write_recording
 

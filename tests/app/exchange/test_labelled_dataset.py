@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import xarray
 from rodsight.exchange.labelled_dataset import make_dataset
 from rodsight.results.hdf5.store import Provenance, save_results
@@ -10,6 +11,7 @@ from rodsight.results.hdf5.store import Provenance, save_results
 from tests.app.results.full_results import make_full_results
 
 
+@pytest.mark.thorough
 def test_the_tree_equals_that_of_the_file(tmp_path):
     results = make_full_results()
     save_results(tmp_path / "results.h5", results, Provenance("", "experiment.toml", (0, None), {}))

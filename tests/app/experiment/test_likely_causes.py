@@ -59,12 +59,14 @@ def test_a_mistake_is_refused_with_its_likely_cause(tracked, capsys, cause):
     assert cause in message
 
 
+@pytest.mark.thorough
 def test_a_very_small_pressure_gives_a_warning(tracked, capsys):
     edit(tracked / "experiment.toml", "pressure = 50000.0", "pressure = 50")
     assert rodsight("check", tracked) == 0
     assert "did you mean 50e3 Pa?" in capsys.readouterr().out
 
 
+@pytest.mark.thorough
 def test_an_open_side_is_reported_with_the_walls_beside_it(tracked, capsys):
     edit(tracked / "experiment.toml", 'truth = "truth_contacts.csv"', "")  # the truth refers to the wall
     file = tracked / "walls.csv"

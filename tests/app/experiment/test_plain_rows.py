@@ -60,6 +60,7 @@ def test_tables_that_are_not_plain_are_left_to_the_csv_module(content):
     assert split_plain(content, ("id", "x"), ()) is None
 
 
+@pytest.mark.thorough
 def test_a_long_table_is_read_in_little_more_memory_than_that_of_its_file(tmp_path):
     file = tmp_path / "long.csv"
     file.write_text("id,x\n" + "".join(f"{row % 250},{row * 1.000001!r}\n" for row in range(100_000)))

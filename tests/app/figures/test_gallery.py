@@ -75,6 +75,7 @@ def test_the_default_frame_is_the_last_settled_one(results):
     assert FrameStatus.SETTLED not in status[default_frame(results) + 1 :]
 
 
+@pytest.mark.thorough
 def test_files_are_written_for_all_figures_with_data(results, tmp_path):
     files = write_figures(results, tmp_path / "figures", ("pdf", "svg"))
     assert {each.name for each in files} == {
@@ -104,9 +105,9 @@ def test_the_network_states_time_shear_status_trust_and_the_force_of_a_line(resu
     assert any(text.endswith("mm") for text in shown)
 
 
-@pytest.mark.parametrize("vision", VISIONS)
-def test_the_surest_and_the_least_sure_third_differ_at_a_glance(results, vision):
-    """In the drawn picture itself, along its lines, in grey and every kind of colour vision."""
+@pytest.fixture(scope="module")
+def colours_of_lines(results):
+    """Relative deviations of bearing contacts, and the colours along the lines of the drawn picture (c, 81, 3)."""
     forces = results.frames[3]
     bearing = forces.fn > 0
     sd = np.zeros_like(forces.fn)
@@ -117,16 +118,24 @@ def test_the_surest_and_the_least_sure_third_differ_at_a_glance(results, vision)
     figure.canvas.draw()
     picture = np.asarray(figure.canvas.buffer_rgba())[..., :3]
     axes = figure.axes[0]
-    lines = branch_lines(results, 3, forces.contacts)[bearing]
     fraction = np.linspace(0.1, 0.9, 81)[:, None]
-    ink = []
-    for start, end in lines:
+    colours = []
+    for start, end in branch_lines(results, 3, forces.contacts)[bearing]:
         x, y = np.rint(axes.transData.transform(start + fraction * (end - start))).astype(int).T
-        seen = picture[len(picture) - 1 - y, x]
-        ink.append(np.mean([cie76(tuple(each), (255, 255, 255), vision) > VISIBLE for each in seen.tolist()]))
+        colours.append(picture[len(picture) - 1 - y, x])
+    return relative, np.array(colours)
+
+
+@pytest.mark.parametrize("vision", VISIONS)
+def test_the_surest_and_the_least_sure_third_differ_at_a_glance(colours_of_lines, vision):
+    """In the drawn picture itself, along its lines, in grey and every kind of colour vision."""
+    relative, colours = colours_of_lines
+    ink = np.array(
+        [np.mean([cie76(tuple(c), (255, 255, 255), vision) > VISIBLE for c in line]) for line in colours.tolist()]
+    )
     order = np.argsort(relative)
     third = len(order) // 3
-    surest, least = np.array(ink)[order[:third]], np.array(ink)[order[-third:]]
+    surest, least = ink[order[:third]], ink[order[-third:]]
     separated = np.mean(surest[:, None] > least[None, :])
     assert separated > 0.95
     assert np.median(surest) - np.median(least) > 0.35  # at a glance

@@ -22,7 +22,10 @@ from rodsight.solver.posterior.frame_posterior import FramePosterior
 
 from tests.app.inference.scenarios import Solved, agreement, solve
 
-pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
+pytestmark = [
+    pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels"),
+    pytest.mark.thorough,
+]
 
 FUSED = "the forces of the next photograph are fused"
 

@@ -36,6 +36,7 @@ def test_later_frames_improve_the_first_and_its_reason_states_so(wrong_centres):
     assert results.statistics[0].contact_count == pytest.approx(contacts, rel=0.1)
 
 
+@pytest.mark.thorough
 def test_the_other_frames_stay_as_they_are(wrong_centres):
     results = wrong_centres.complete()
     for one, other in zip(wrong_centres.frames[1:], results.frames[1:], strict=True):

@@ -81,6 +81,7 @@ def test_every_contact_states_the_coefficient_that_was_used(contradicted):
         assert (np.abs(frame.ft) <= expected * frame.fn * (1 + 1e-6) + 1e-9).all()
 
 
+@pytest.mark.thorough
 def test_an_interrupted_sequence_continues_bit_for_bit(contradicted):
     inputs, results = contradicted
     whole = MemoryStore()
@@ -91,6 +92,7 @@ def test_an_interrupted_sequence_continues_bit_for_bit(contradicted):
         assert one.trust == other.trust
 
 
+@pytest.mark.thorough
 def test_an_interrupted_sequence_of_close_photographs_continues_bit_for_bit(contradicted, monkeypatch):
     inputs, neighbours = contradicted
     monkeypatch.setattr(correct_module, "choose_span", lambda tracks: (3, "read over 3 photographs"))
@@ -118,6 +120,7 @@ def test_noise_that_hides_sliding_is_the_one_that_the_calibration_measured(contr
     assert seen[0] >= 3.0 * inputs.tracks.sigma.max()
 
 
+@pytest.mark.thorough
 def test_a_first_frame_that_cannot_be_estimated_stays_and_is_reported(contradicted, monkeypatch):
     inputs, _ = contradicted
     store, failures = MemoryStore(), []
@@ -135,6 +138,7 @@ def test_a_first_frame_that_cannot_be_estimated_stays_and_is_reported(contradict
     np.testing.assert_array_equal(results.frames[0].fn, store.frames[0].forces.fn)
 
 
+@pytest.mark.thorough
 def test_the_observer_receives_every_frame_once_and_the_progress(contradicted, tmp_path: Path):
     inputs, _ = contradicted
     events: list[int] = []
@@ -167,6 +171,7 @@ def test_a_sequence_without_a_solved_frame_is_neither_estimated_nor_checked(cont
     assert results.friction_check is None
 
 
+@pytest.mark.thorough
 def test_contacts_of_an_interpolated_rod_bear_force_and_are_marked(contradicted):
     inputs, results = contradicted
     frame, load = 4, np.bincount(results.frames[4].contacts.i, results.frames[4].fn)

@@ -247,6 +247,7 @@ def typed(words: tuple[str, ...]) -> list[str]:
     return [*shlex.split(line), *(word for options in added for word in options.split())]
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("at_work")
 @pytest.mark.parametrize(
     "words",

@@ -134,6 +134,7 @@ def called_commands(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return called
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("page", [*TEXTS, "README.md"])
 def test_every_command_of_a_page_has_valid_arguments(page, called_commands):
     typed = [words for words in commands(TEXTS.get(page, README)) if words and not words[0].startswith("-")]
@@ -159,6 +160,7 @@ def python_blocks() -> Iterator[Any]:
             yield pytest.param(page, number, block, id=f"{page}-{number}", marks=marks)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("page", "number", "block"), list(python_blocks()))
 def test_the_python_of_a_page_runs(page, number, block, folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
@@ -200,6 +202,7 @@ def test_words_without_a_match_are_reported(capsys):
     assert not find_sections("how do I")
 
 
+@pytest.mark.thorough
 def test_the_command_writes_or_prints_the_pages(tmp_path, capsys):
     assert command("docs", "troubleshooting", "--out", tmp_path) == 0
     assert (tmp_path / "troubleshooting.html").is_file()

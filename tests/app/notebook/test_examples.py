@@ -13,6 +13,7 @@ ERRORS = ("InputError", "RunError")
 NAMES = tuple(sorted(set(rodsight.__all__) - {"__version__", *ERRORS}))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", NAMES)
 def test_examples_give_the_printed_output(name, examples, monkeypatch):
     monkeypatch.chdir(examples)

@@ -52,6 +52,7 @@ def test_public_names_exist_and_no_others():
         rodsight.solv  # noqa: B018
 
 
+@pytest.mark.thorough
 def test_a_run_in_python_writes_the_same_files_as_the_command(made_tracks, run, tmp_path):
     assert command("run", str(made_tracks), "--out", str(tmp_path / "run"), "--quiet", "--set", "solver.sweeps=50") == 0
     assert run.file is not None
@@ -93,6 +94,7 @@ def test_a_missing_frame_is_named(run):
         run.contacts(5)
 
 
+@pytest.mark.thorough
 def test_arrays_give_the_same_forces_as_the_experiment(run, poses, walls):
     solved = solve(poses, walls)
     assert solved.file is None

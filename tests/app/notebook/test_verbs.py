@@ -59,6 +59,7 @@ def test_bad_input_is_an_input_error_with_one_line(made_tracks):
     assert issubclass(rodsight.RunError, Exception)
 
 
+@pytest.mark.thorough
 def test_check_gives_what_the_command_prints(made_tracks, capsys):
     found = rodsight.check(made_tracks)
     assert command("check", str(made_tracks), "--json") == 0
@@ -68,6 +69,7 @@ def test_check_gives_what_the_command_prints(made_tracks, capsys):
     assert printed["prediction"] == list(found["prediction"])
 
 
+@pytest.mark.thorough
 def test_tracks_solve_to_the_same_forces(made_tracks, run, tmp_path):
     tracks = rodsight.track(made_tracks, out=tmp_path / "run")
     walls = pd.read_csv(made_tracks / "walls.csv")  # those of the run are corrected
@@ -97,6 +99,7 @@ def test_compare_has_every_contact_of_either(made_tracks, run):
     np.testing.assert_array_equal(merged["fn_x"], merged["fn_y"])
 
 
+@pytest.mark.thorough
 def test_a_forbidden_contact_bears_nothing_and_the_input_is_used_again(run):
     strongest = run.contacts(4).query("j >= 0").nlargest(1, "fn")[["i", "j"]].to_numpy()[0].tolist()
     unchanged = rodsight.what_if(run)
@@ -138,6 +141,7 @@ def test_friction_and_place_are_changed_locally(run):
     pd.testing.assert_series_equal(moved["nx"][~own], given["nx"][~own])
 
 
+@pytest.mark.thorough
 def test_a_forced_contact_is_listed(run):
     contacts = run.contacts(4)
     listed = set(zip(contacts["i"], contacts["j"], strict=True))
@@ -155,6 +159,7 @@ def test_a_forced_contact_is_listed(run):
     assert ContactSource.FORBIDDEN_BY_REVIEWER not in forces.source
 
 
+@pytest.mark.thorough
 def test_moved_grains_and_another_friction_change_the_inputs(run):
     moved = rodsight.what_if(run, 4, move={7: (2e-5, 0.0)})
     assert moved.inputs.tracks.position[4, 7, 0] - run.grains(4)["x"][7] == pytest.approx(2e-5, abs=1e-5)
@@ -179,6 +184,7 @@ def test_unusable_assumptions_are_named(run, arguments, message):
         rodsight.what_if(run, **arguments)
 
 
+@pytest.mark.thorough
 def test_what_if_refuses_a_run_whose_input_changed(tracked, tmp_path):
     run = rodsight.run(tracked, out=tmp_path / "run", settings=FEW | {"recording.sweeps": "none"})
     file = tracked / "tracks.csv"
@@ -187,6 +193,7 @@ def test_what_if_refuses_a_run_whose_input_changed(tracked, tmp_path):
         rodsight.what_if(run, friction=0.3)
 
 
+@pytest.mark.thorough
 def test_verdicts_of_a_table_are_stored(tracked, tmp_path):
     run = rodsight.run(tracked, out=tmp_path / "run", settings=FEW)
     table = run.contacts(2).head(2)[["frame", "i", "j", "wall"]].assign(verdict="contact")

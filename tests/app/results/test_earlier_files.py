@@ -140,6 +140,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Results:
     return load_results(save_new(tmp_path_factory.mktemp("whole")))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "path", [pytest.param(path, marks=pytest.mark.slow) if k % 12 else path for k, path in enumerate(OTHERS)]
 )

@@ -28,6 +28,7 @@ def open_tree(file: Path, engine: str) -> xarray.DataTree:
         return tree.load()
 
 
+@pytest.mark.thorough
 def test_every_dataset_is_a_variable_with_its_dimensions(engine, tmp_path):
     results = make_full_results()
     save_results(tmp_path / "results.h5", results, ORIGIN)
@@ -47,6 +48,7 @@ def test_every_dataset_is_a_variable_with_its_dimensions(engine, tmp_path):
     assert bool(tree["calibration/applied"])
 
 
+@pytest.mark.thorough
 def test_a_run_without_any_contact_opens(engine, tmp_path):
     results = make_full_results()
     frames = []

@@ -165,6 +165,7 @@ class WithDrift(FrameForces):
     wear: Annotated[Array | None, Quantity("wear of every contact", "m", "contact", since=2)] = None
 
 
+@pytest.mark.thorough
 def test_a_declared_quantity_reaches_every_output(tmp_path, monkeypatch):
     monkeypatch.setitem(schema.PARTS, "frames", WithDrift)
     plain = make_full_results()

@@ -19,6 +19,8 @@ from rodsight.verdicts.log import VERDICTS, Entry, Flag, Verdict, VerdictLog
 
 from tests.program import RODSIGHT, rodsight
 
+pytestmark = pytest.mark.thorough
+
 ESTIMATORS = ("ensemble", "nlgs")
 FEW = ("--set", "solver.sweeps=50", "--quiet")
 

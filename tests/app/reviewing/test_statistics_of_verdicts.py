@@ -82,6 +82,7 @@ def test_a_sample_meets_every_stratum_early_and_every_candidate_once(frames):
     assert set(queue.stratum[: 48 + STRATUM_COUNT].tolist()) == present
 
 
+@pytest.mark.thorough
 def test_the_interval_contains_the_truth_at_its_stated_rate(frames):
     """The queue is a random sample: 95 % intervals contain the true precision and recall in about 95 % of draws."""
     probability = np.concatenate([each.probability for each in frames])

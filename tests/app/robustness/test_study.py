@@ -60,6 +60,7 @@ def test_only_photographs_of_both_runs_are_compared(nominal):
     assert effect.r_fn > 0.7  # the last photograph, reached in steps twice as wide
 
 
+@pytest.mark.thorough
 def test_lower_friction_lowers_the_macroscopic_friction_angle(nominal):
     low, high = (measure_case(nominal, Case((("friction", value),))) for value in (0.6, 1.4))
     assert low.friction_angle_change < 0.0
@@ -71,6 +72,7 @@ def test_inputs_that_were_not_varied_have_the_trust_of_the_run(nominal):
     np.testing.assert_array_equal(again.trust, nominal.networks.trust)
 
 
+@pytest.mark.thorough
 def test_a_finished_run_is_not_run_again(nominal, tmp_path, monkeypatch):
     effect_log = EffectLog(tmp_path / "runs.jsonl", "x")
     first = run_study(nominal, [KAPPA], effect_log)

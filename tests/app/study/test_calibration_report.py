@@ -67,6 +67,7 @@ def test_the_page_names_version_seeds_and_the_hash_of_its_data(study):
     assert "http" not in page.replace("http://www.w3.org", "")  # self-contained
 
 
+@pytest.mark.thorough
 def test_the_page_compares_predictions_and_names_what_was_diagnosed(study):
     outcomes = (outcome(predicted(SOUND), 0.97), outcome(predicted(None), 0.9))
     page = report_page(replace(study, outcomes=outcomes))

@@ -30,6 +30,7 @@ def _errors(rng: np.random.Generator) -> ContactErrors:
     )  # fmt: skip
 
 
+@pytest.mark.thorough
 def test_fitted_intervals_cover_in_every_group_on_errors_that_were_not_fitted():
     fit = fit_intervals(_errors(np.random.default_rng(1)))
     others = _errors(np.random.default_rng(2))
@@ -42,6 +43,7 @@ def test_fitted_intervals_cover_in_every_group_on_errors_that_were_not_fitted():
     assert covered(others.select(others.group == Group.WEAK))[0] < 0.4
 
 
+@pytest.mark.thorough
 def test_both_coverages_are_near_for_errors_with_heavy_tails():
     rng = np.random.default_rng(4)
     plain = _errors(rng)

@@ -34,6 +34,7 @@ def test_every_kind_counts_the_same():
     assert uneven.coverage(np.full(len(uneven.error), 0.1)) == pytest.approx((0.5, 0.5))
 
 
+@pytest.mark.thorough
 def test_the_table_names_factors_and_the_coverage_of_kinds_left_out():
     lines = describe_scale(sample(), dict.fromkeys(("per_load", "per_correction", "per_error"), 0.3), LEAST)
     assert lines[0] == "[scale_sd]"

@@ -96,6 +96,7 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(SCENARIOS, "unseen", replace(SCENARIOS["unseen"], loading=loading))
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("short")
 def test_a_scenario_is_solved_and_compared_with_its_whole_truth(tmp_path: Path) -> None:
     score = score_scenario(StudyPlan(FEW, tmp_path), "unseen", 1)

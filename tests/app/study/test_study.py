@@ -53,6 +53,7 @@ def test_true_forces_agree_perfectly_with_themselves(truth):
     assert -1.0 <= found.r_fn <= 1.0
 
 
+@pytest.mark.thorough
 def test_the_accuracy_of_exact_tracks_is_measured(truth):
     row = measure_accuracy([truth], 0.0, "ensemble", window=WINDOW)
     assert row.late > 0.85  # 30 grains, no noise
@@ -72,6 +73,7 @@ def test_the_papers_claims_are_listed_with_a_verdict(folder, monkeypatch):
     assert "settles in about five photographs" in shown.getvalue()
 
 
+@pytest.mark.thorough
 def test_forces_of_a_packing_with_an_inferred_rod_are_compared_body_by_body(truth):
     start = window_starts(truth, WINDOW)[0]
     frame = infer_sequence(observe(truth, range(start, start + WINDOW), 1e-6, np.random.default_rng(1))).frames[0]

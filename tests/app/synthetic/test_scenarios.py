@@ -61,6 +61,7 @@ def test_every_name_has_a_scenario() -> None:
     assert set(get_args(ScenarioName)) == set(SCENARIOS)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["biaxial", "isotropic", "gravity"])
 def test_the_truth_of_a_scenario_is_in_equilibrium(name: ScenarioName) -> None:
     truth = truth_of(name, frames=3)
@@ -110,6 +111,7 @@ def test_a_packing_around_a_moving_core_is_in_equilibrium_under_the_rings_pressu
     assert angle == pytest.approx([0.0, 0.02, 0.04])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "walls"),
     [("shear_box", (*BOX_NAMES[:-1],)), ("footing", ("bottom", "right", "left", "footing")),
@@ -133,6 +135,7 @@ def test_the_truths_of_other_apparatus_are_in_equilibrium(name: ScenarioName, wa
         assert force_on(truth, "bottom") == pytest.approx(weight.sum() + force_on(truth, "footing"), rel=0.3)
 
 
+@pytest.mark.thorough
 def test_loads_are_stated_exactly_and_circles_in_a_separate_table(tmp_path: Path, monkeypatch) -> None:
     def make(name: ScenarioName) -> Path:
         monkeypatch.setattr(

@@ -174,6 +174,7 @@ def test_rods_in_photographs_are_at_their_true_positions(photographed: Synthesis
     assert np.all(ends.max(axis=(0, 1, 2)) < np.array([width, height]) - 5)
 
 
+@pytest.mark.thorough
 def test_rods_and_bars_in_photographs_move_as_the_truth(tmp_path: Path) -> None:
     made = synthesize(
         tmp_path / "turned", SynthesisSettings(**TINY | {"frames": 2, "step_degrees": 6.0, "pixel_size": 2.5e-4})

@@ -11,6 +11,8 @@ from rodsight.tracks import TrackStatus
 from tests.app.experiment.tables import edit
 from tests.app.tracking.photographed import keep_first_walls, track
 
+pytestmark = pytest.mark.thorough
+
 HEADER = "frame,id,x,y,theta\n"
 
 

@@ -144,6 +144,7 @@ def test_a_wrong_given_pose_does_not_make_the_rod_there_suspect(rods: Rods, trac
     assert poses.status[0] == TrackStatus.OK
 
 
+@pytest.mark.thorough
 def test_an_error_of_the_program_is_no_failure_of_a_photograph(
     made_photographs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -128,6 +128,7 @@ def test_second_best_and_references_are_stored(tracks: Tracks, tmp_path: Path) -
     assert again.renewal_count == 0
 
 
+@pytest.mark.thorough
 def test_the_report_names_grains_with_a_new_reference(rods: Rods, photographs: Photographs, tracks: Tracks) -> None:
     second = np.full(tracks.zncc.shape, np.nan)
     second[DAMAGE, DAMAGED] = 0.4321

@@ -34,6 +34,7 @@ def test_rows_of_later_frames_are_kept_when_walls_are_followed(partly_given: Tra
     assert walls.endpoints[2, top] == pytest.approx(partly_given.true_walls[2, top])
 
 
+@pytest.mark.thorough
 def test_a_wall_without_marks_is_named(photographed: Path, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     top = keep_first_walls(photographed)[0, 2]
     for file in (photographed / "photos").iterdir():
@@ -49,6 +50,7 @@ def test_a_wall_without_marks_is_named(photographed: Path, tmp_path: Path, capsy
     assert "patches of texture" in message
 
 
+@pytest.mark.thorough
 def test_detected_grains_can_be_edited_and_used(plain: Tracked, photographed: Path, tmp_path: Path) -> None:
     first = plain.tracks
     with (plain.out / "detections.csv").open(newline="") as stream:
@@ -69,6 +71,7 @@ def test_detected_grains_can_be_edited_and_used(plain: Tracked, photographed: Pa
     assert np.nanmax(np.abs(np.diff(again.position, axis=0) - np.diff(first.position[:, same], axis=0))) < 1e-5
 
 
+@pytest.mark.thorough
 def test_corrections_are_honoured(plain: Tracked, photographed: Path, tmp_path: Path) -> None:
     first = plain.tracks
     (photographed / "corrections.csv").write_text("frame,id,x,y,theta\n2,4,lost,,\n1,7,200.5,210.25,0.25\n")

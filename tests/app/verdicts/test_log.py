@@ -105,6 +105,7 @@ def _write_many(file, name):
         log.append(contact(frame=number, reviewer=name))
 
 
+@pytest.mark.thorough
 def test_programs_that_write_at_the_same_time_do_not_mix_lines(log):
     start = multiprocessing.get_context("spawn")
     writers = [start.Process(target=_write_many, args=(log.file, f"reviewer {n}")) for n in range(3)]

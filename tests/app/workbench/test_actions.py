@@ -36,6 +36,7 @@ def files_of(folder: Path) -> dict[str, str]:
     return {name: (folder / name).read_text() for name in ("grains.csv", "walls.csv", "times.csv")}
 
 
+@pytest.mark.thorough
 def test_a_script_does_the_same_again(done, photographs_only, tmp_path, monkeypatch):
     visitor, at = done
     answer = visitor.request("script", at=at)
@@ -54,6 +55,7 @@ def test_a_script_does_the_same_again(done, photographs_only, tmp_path, monkeypa
     assert one == two
 
 
+@pytest.mark.thorough
 def test_changes_of_other_programs_are_named_in_the_script(done, photographs_only):
     visitor, at = done
     draft = visitor.workbench.project(at).draft
@@ -87,6 +89,7 @@ def test_wrong_actions_are_refused(photographs_only):
         test.set_scale(pixel_size="large")
 
 
+@pytest.mark.thorough
 def test_a_set_up_is_taken_over_for_other_photographs(done, photographs_only):
     visitor, at = done
     later = photographs_only / "tuesday" / "pictures"

@@ -119,6 +119,7 @@ BAD = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", [*BAD, "not UTF-8", "folder", "larger than memory"])
 def test_a_bad_folder_is_shown_as_such_beside_the_others(root, kind):
     folder = os.fsencode(root) + (b"/b\xff\xfed" if kind == "not UTF-8" else b"/bad")

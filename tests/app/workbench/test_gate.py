@@ -132,6 +132,7 @@ def test_the_shared_file_is_described_and_downloaded(visitor, photographs_only):
     assert visitor.post("share", {"at": at, "scale": 2.0}).status_code == 400
 
 
+@pytest.mark.thorough
 def test_the_viewer_is_the_installed_one_as_a_module(visitor):
     script = visitor.client.get("/viewer/script.js")
     assert script.text.endswith("export default wasm_bindgen;\n")

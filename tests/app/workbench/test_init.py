@@ -13,6 +13,7 @@ def folder(photographs_only):
     return photographs_only / "my photographs"
 
 
+@pytest.mark.thorough
 def test_a_wrong_value_gives_one_line_and_leaves_nothing(folder, capsys):
     flags = ("--photographs", "pictures/*.jpg", "--interval", "30", "--pixel-size", "2.5e-4")
     for wrong, named in (
@@ -37,6 +38,7 @@ def test_an_experiment_that_is_there_is_not_overwritten(folder, capsys):
     assert file.read_text() == "name = 'mine'\n"
 
 
+@pytest.mark.thorough
 def test_a_new_folder_is_made_beside_the_photographs_and_goes_if_nothing_is_made(tmp_path, capsys):
     discs(tmp_path)
     flags = ("--photographs", "../shots/*.png", "--channel", "red", "--pixel-size", "1e-4", "--interval", "1")
@@ -102,6 +104,7 @@ def test_channel_region_outline_and_range_of_radii_are_used(tmp_path, capsys):
     assert {round(float(row.split(",")[3])) for row in rows} <= {21, 22, 23}
 
 
+@pytest.mark.thorough
 def test_walls_that_cut_through_rods_are_left_out_and_named(tmp_path, capsys, monkeypatch):
     discs(tmp_path)
     lines = np.array([
@@ -118,6 +121,7 @@ def test_walls_that_cut_through_rods_are_left_out_and_named(tmp_path, capsys, mo
     assert "bottom" in (tmp_path / "walls.csv").read_text()
 
 
+@pytest.mark.thorough
 def test_bars_without_texture_are_no_walls_but_impose_the_motion_of_the_outermost_rods(tmp_path, capsys):
     discs(tmp_path / "data")
     folder = tmp_path / "new"
@@ -134,6 +138,7 @@ def test_bars_without_texture_are_no_walls_but_impose_the_motion_of_the_outermos
     assert not (folder / "walls.csv").exists()
 
 
+@pytest.mark.thorough
 def test_bars_that_do_not_hold_the_rods_do_not_end_the_set_up(tmp_path, capsys, monkeypatch):
     discs(tmp_path)
     lines = np.array([  # each runs the wrong way round
@@ -147,6 +152,7 @@ def test_bars_that_do_not_hold_the_rods_do_not_end_the_set_up(tmp_path, capsys, 
     assert load_experiment(tmp_path).config.boundary.grains == "outer"
 
 
+@pytest.mark.thorough
 def test_a_folder_is_made_only_for_photographs_that_are_there_and_metres_need_a_scale(tmp_path, capsys):
     discs(tmp_path)
     new, there = tmp_path / "new", tmp_path / "shots"
@@ -212,6 +218,7 @@ def test_a_video_and_the_rods_of_another_program_make_an_experiment(tmp_path):
     assert len(read_grain_guess(made).id) == labels.max()
 
 
+@pytest.mark.thorough
 def test_each_frame_of_a_time_lapse_is_a_photograph(tmp_path, capsys):
     labelled_discs(tmp_path)
     flags = ("--pixel-size", 1e-4, "--walls", "none", "--grains", tmp_path / "labels.png")

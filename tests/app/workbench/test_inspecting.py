@@ -375,6 +375,7 @@ def test_the_motion_over_the_window_is_that_of_the_results(solved):
     np.testing.assert_allclose(moved, measured.fluctuation[-1, here], rtol=0.02, atol=2e-6)
 
 
+@pytest.mark.thorough
 def test_fringes_are_values_of_the_discs_where_the_run_has_them(solved):
     visitor, at, results, folder = solved
     last = FIRST + len(results.frames) - 1

@@ -138,6 +138,7 @@ def wait_until(test):
         time.sleep(0.05)
 
 
+@pytest.mark.thorough
 def test_a_run_outlives_its_server_and_is_found_again(orphan):
     time.sleep(0.5)  # it has written since
     orphan.find()

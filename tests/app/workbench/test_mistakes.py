@@ -58,6 +58,7 @@ def walled(begun, made_photographs, photographs_only):
     return visitor, at
 
 
+@pytest.mark.thorough
 def test_what_lies_outside_the_walls_is_dropped_at_once(walled):
     visitor, at = walled
     described = visitor.request("project", at=at)
@@ -69,12 +70,14 @@ def test_what_lies_outside_the_walls_is_dropped_at_once(walled):
     assert len(visitor.request("undo", at=at)["rods"]["id"]) == 32
 
 
+@pytest.mark.thorough
 def test_circles_much_smaller_than_the_rods_are_named(walled):
     visitor, at = walled
     assert "2 of 32 circles have radii up to 2.2 mm" in messages(visitor.request("project", at=at), "rods")
     assert "have radii up to" not in messages(visitor.request("drop_outside", at=at), "rods")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("factor", "word"), [(10.0, "large"), (0.1, "small")])
 def test_a_scale_wrong_by_ten_is_named(walled, made_photographs, factor, word):
     visitor, at = walled
@@ -89,6 +92,7 @@ def test_a_scale_wrong_by_ten_is_named(walled, made_photographs, factor, word):
     assert np.log10(ratio) == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.thorough
 def test_no_rod_at_a_scale_wrong_by_ten_names_the_scale(begun, made_photographs):
     visitor, at = begun
     section = load_experiment(made_photographs).config.photographs
@@ -97,6 +101,7 @@ def test_no_rod_at_a_scale_wrong_by_ten_names_the_scale(begun, made_photographs)
     assert "scale: looks 10 times too large" in answer
 
 
+@pytest.mark.thorough
 def test_a_masked_rod_is_not_detected(begun, made_photographs):
     visitor, at = begun
     section = load_experiment(made_photographs).config.photographs

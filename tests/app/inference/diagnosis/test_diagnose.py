@@ -53,6 +53,7 @@ def test_the_clear_winner_is_named_with_effect_and_cure(scores):
     assert "Cure: calibrate the camera" in found.sentence()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("rises", [{"all_radii": 0.15}, {"all_radii": 0.5, "stretched_picture": 0.45}, {}])
 def test_without_a_clear_winner_nothing_is_blamed(scores, rises):
     scores.update(rises)

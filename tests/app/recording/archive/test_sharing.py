@@ -31,6 +31,7 @@ def verify(path) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.thorough
 def test_a_shared_recording_is_smaller_complete_and_has_the_same_forces(recording, results, tmp_path):
     report = share_recording(recording.path, tmp_path / "small.rrd", first=1, stop=3, scale=0.5)
     one = share_recording(recording.path, tmp_path / "one.rrd", first=1, stop=2, scale=0.5)
@@ -75,6 +76,7 @@ def test_an_invalid_scale_or_range_is_refused(recording, tmp_path, wrong):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.thorough
 def test_a_truncated_recording_is_repaired_up_to_its_end(tmp_path):
     results = make_results(20, sweeps=30)
     path = write_recording(results, tmp_path / "run.rrd").path
@@ -95,6 +97,7 @@ def test_a_file_without_data_cannot_be_repaired(tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["noise.rrd"]
 
 
+@pytest.mark.thorough
 def test_a_card_names_its_run_and_shows_every_contact_grain_and_wall_of_the_last_frame(results, tmp_path):
     path = write_recording(replace(results, name="<b>shear"), tmp_path / "run.rrd").path
     card = make_card(path)
@@ -112,6 +115,7 @@ def test_a_card_names_its_run_and_shows_every_contact_grain_and_wall_of_the_last
         assert f"#{colour:08x}" in card
 
 
+@pytest.mark.thorough
 def test_a_folder_of_runs_is_one_page_with_a_card_for_each_and_one_viewer(tmp_path, capsys):
     path = write_recording(make_results(1, sweeps=5), tmp_path / "run.rrd").path
     for name in ("first", "second", "damaged"):

@@ -28,6 +28,7 @@ def before(results):
     return replace(results, frames=(), statistics=())
 
 
+@pytest.mark.thorough
 def test_the_file_of_a_live_recording_is_complete(results, tmp_path):
     live = LiveRecording(tmp_path / "live.rrd", "none")
     live.start(before(results))
@@ -42,6 +43,7 @@ def test_the_file_of_a_live_recording_is_complete(results, tmp_path):
     assert repair_recording(live.path, tmp_path / "again.rrd").frames == len(results.frames)
 
 
+@pytest.mark.thorough
 def test_every_finished_frame_is_in_the_file_before_the_next_begins(tmp_path):
     results = make_results(3, sweeps=20)
     live = LiveRecording(tmp_path / "live.rrd", "none")
@@ -97,6 +99,7 @@ def test_a_watched_run_ends_with_the_full_recording_only(tracked, tmp_path, caps
     assert len(read_forces(out / "recording.rrd")) == 5
 
 
+@pytest.mark.thorough
 def test_the_recording_of_another_process_is_complete(results, tmp_path):
     messages: list[str] = []
     live = LiveProcess(tmp_path / "live.rrd", messages.append, viewer="web")
@@ -121,6 +124,7 @@ def test_a_killed_live_process_does_not_affect_the_run(results, tmp_path):
     assert messages == ["The live view broke off, without harm to the run."]
 
 
+@pytest.mark.thorough
 def test_without_disk_space_for_waiting_frames_the_view_ends_and_the_run_continues(results, tmp_path, monkeypatch):
     messages: list[str] = []
     live = LiveProcess(tmp_path / "live.rrd", messages.append)

@@ -42,6 +42,7 @@ def split(results, tmp_path_factory) -> Path:
     return file
 
 
+@pytest.mark.thorough
 def test_all_parts_together_equal_the_recording(whole, split):
     one, many = read_forces(whole), read_forces(split)
     assert list(one) == list(many) == list(range(FRAMES))
@@ -64,6 +65,7 @@ def test_every_part_opens_alone(whole, split):
         assert frames == set(range(FRAMES)[number * IN_ONE : (number + 1) * IN_ONE])
 
 
+@pytest.mark.thorough
 def test_some_frames_of_several_parts_are_shared(split, tmp_path):
     shared = share_recording(split, tmp_path / "few.rrd", first=2, stop=5)
     assert list(read_forces(shared.path)) == [2, 3, 4]
@@ -74,6 +76,7 @@ def test_parts_are_not_listed_as_recordings_of_a_folder(split):
     assert find_recordings(split.parent) == [split]
 
 
+@pytest.mark.thorough
 def test_a_shorter_recording_leaves_no_part_behind(results, tmp_path):
     file = tmp_path / "recording.rrd"
     write_recording(results, file, options=RecordingOptions(part_frames=IN_ONE))
@@ -87,6 +90,7 @@ def test_a_part_of_another_recording_is_ignored(whole, split, tmp_path):
     assert parts_of(tmp_path / "recording.rrd") == [tmp_path / "recording.rrd"]
 
 
+@pytest.mark.thorough
 def test_a_size_is_that_of_all_parts(results, tmp_path):
     full = write_recording(results, tmp_path / "full.rrd", options=RecordingOptions(part_frames=IN_ONE, sweeps="all"))
     less = write_recording(

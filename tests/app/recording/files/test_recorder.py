@@ -43,6 +43,7 @@ def test_the_same_run_recorded_twice_is_the_same(results, truth, tmp_path):
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.thorough
 def test_the_comparison_detects_a_differing_force(results, tmp_path):
     write_recording(results, tmp_path / "first.rrd")
     fn = results.frames[1].fn.copy()
@@ -103,6 +104,7 @@ def test_a_recorder_that_was_not_started_raises(results):
         recorder.frame(results.frames[0], results.statistics[0])
 
 
+@pytest.mark.thorough
 def test_a_size_limit_reduces_the_sweeps_and_adds_a_note(tmp_path):
     results = make_results(3, 10, 10, sweeps=400)
     full = write_recording(results, tmp_path / "full.rrd", options=RecordingOptions(sweeps="all"))
@@ -165,6 +167,7 @@ def test_a_file_without_its_end_is_refused(tmp_path):
         _check_complete(tmp_path / "cut.rrd")
 
 
+@pytest.mark.thorough
 def test_a_side_file_opens_as_one_recording_with_every_sweep(tmp_path):
     from rodsight.recording.files.side_file import record_side_file
 

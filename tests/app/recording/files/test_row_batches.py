@@ -22,6 +22,7 @@ def _contents(file, path) -> list[str]:
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("every", [1, 2])
 def test_rows_are_the_same_however_many_frames_share_a_message(results, tmp_path, monkeypatch, every):
     write_recording(results, tmp_path / "joined.rrd")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 # Machado, Oliveira and Fernandes 2009, severity 1, on linear sRGB; grey: luminance.
@@ -24,6 +26,7 @@ _XYZ = np.array(
 _WHITE = _XYZ.sum(axis=1)
 
 
+@cache
 def cie76(one: tuple[int, ...], other: tuple[int, ...], vision: str = "usual") -> float:
     """Return the CIELAB distance of two sRGB colours in a vision of VISIONS."""
     return float(np.linalg.norm(_lab(one, vision) - _lab(other, vision)))

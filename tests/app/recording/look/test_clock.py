@@ -50,6 +50,7 @@ def test_results_of_earlier_versions_without_strain_have_no_strain_timeline(tmp_
     assert lines == {entities.FRAME, entities.SWEEP, entities.TIME}
 
 
+@pytest.mark.thorough
 def test_a_shared_file_and_a_side_file_keep_all_timelines(recording, results, tmp_path):
     whole = {entities.FRAME, entities.SWEEP, entities.TIME, entities.STRAIN}
     shared = components(share_recording(recording.path, tmp_path / "small.rrd", first=1, stop=3, scale=0.5).path)

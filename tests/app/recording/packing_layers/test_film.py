@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from rodsight.drawing.force_range import ForceRange
 from rodsight.recording.archive.share import share_recording
 from rodsight.recording.files.finished_run import write_recording
@@ -72,6 +73,7 @@ def test_a_shared_recording_has_only_the_pictures_of_its_frames(recording, tmp_p
     assert there == [1, 2]
 
 
+@pytest.mark.thorough
 def test_the_films_are_small(tmp_path):
     results = make_results(6, 16, 14, sweeps=300)
     path = write_recording(results, tmp_path / "run.rrd").path

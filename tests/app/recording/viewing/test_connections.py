@@ -76,6 +76,7 @@ def read_all(connection: socket.socket) -> bytes:
     return content
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of descriptors")
 @pytest.mark.parametrize("kind", KINDS)
 def test_connections_without_a_request_do_not_lock_the_owner_out(kind, tmp_path):

@@ -55,6 +55,7 @@ def test_unknown_radii_are_measured() -> None:
     assert np.median(np.abs(found.radius[index[near]] - rods.radius[near])) < 0.5
 
 
+@pytest.mark.thorough
 def test_rods_cut_by_the_border_are_found_when_half_in_view() -> None:
     rods = lay_rods(3, cut=True)
     found = detect_grains(rods.reference(), DetectionSettings(radii=CLASSES))
@@ -66,6 +67,7 @@ def test_rods_cut_by_the_border_are_found_when_half_in_view() -> None:
     assert found.count == len(np.unique(index[near]))
 
 
+@pytest.mark.thorough
 def test_given_positions_are_refined() -> None:
     rods = lay_rods(4)
     generator = np.random.default_rng(0)

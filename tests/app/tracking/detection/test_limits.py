@@ -31,6 +31,7 @@ def photograph(
     return np.ascontiguousarray(image.astype(np.float32) @ LUMA, dtype=np.float32)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "blur", [0.6, pytest.param(1.1, marks=pytest.mark.slow), pytest.param(1.5, marks=pytest.mark.slow)]
 )
@@ -56,6 +57,7 @@ def test_a_sharp_binary_picture_is_no_obstacle() -> None:
     assert np.abs(found.radius - 22.0).max() < 0.5
 
 
+@pytest.mark.thorough
 def test_sizes_one_to_eight_are_found_without_settings() -> None:
     """Circles in a large rod's texture are rejected, and rods beyond the usual sizes are found."""
     x = np.array([110.0, 300.3, 300.0, 60.5, 120.2, 180.0, 240.0, 389.0, 224.0])
@@ -68,6 +70,7 @@ def test_sizes_one_to_eight_are_found_without_settings() -> None:
     assert np.abs(found.radius - radius[near.argmin(axis=1)]).max() < 1.0
 
 
+@pytest.mark.thorough
 def test_sigma_covers_a_one_sided_shadow() -> None:
     x, y, radius = rods_on_a_grid(20.0, 44.0)
     found = detect_grains(

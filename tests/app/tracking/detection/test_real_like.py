@@ -87,6 +87,7 @@ def test_brown_rods_are_followed_over_thirteen_pixels_and_five_degrees(
     assert (poses.status != TrackStatus.SUSPECT).mean() > 0.97
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("size", [(SIDE, SIDE), pytest.param((WIDTH, HEIGHT), marks=pytest.mark.screen)])
 def test_circles_at_the_border_do_not_run_away_and_swallow_others(
     laboratory: Laboratory, tmp_path: Path, size: tuple[int, int]

@@ -26,6 +26,7 @@ def speckled() -> np.ndarray:
     return image.astype(np.float32)
 
 
+@pytest.mark.thorough
 def test_speckles_of_the_size_of_grains_at_ten_times_the_scale_are_no_packing(speckled):
     mistaken = (RADIUS / 10,)
     found = detect_grains(speckled, DetectionSettings(mistaken))
@@ -33,6 +34,7 @@ def test_speckles_of_the_size_of_grains_at_ten_times_the_scale_are_no_packing(sp
     assert find_other_scale(speckled, mistaken, found) == (10.0, 46)
 
 
+@pytest.mark.thorough
 def test_packed_grains_are_not_looked_for_at_another_scale(speckled, monkeypatch):
     found = detect_grains(speckled, DetectionSettings((float(RADIUS),)))
     assert (found.count, packed_fraction(found)) == (46, pytest.approx(0.8, abs=0.1))

@@ -57,6 +57,7 @@ def test_places_of_a_copy_are_those_of_the_photograph() -> None:
     assert np.allclose(copy.from_copy(np.zeros(1), np.zeros(1)), [[0.5 * (across - 1.0)], [0.5 * (down - 1.0)]])
 
 
+@pytest.mark.thorough
 def test_rods_with_edges_of_three_pixels_are_found_and_centred() -> None:
     rods = lay_rods(4, width=620, height=560)
     image = enlarged(rods, 2.6)

@@ -29,6 +29,7 @@ friction = 0.3
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("light", [WHITE, BLACK], ids=["white on black", "black on white"])
 def test_plain_discs_are_detected_and_followed_without_rotation(tmp_path: Path, light: Light) -> None:
     x, y, radius = lay_row_by_row(3, 3, (13.0, 18.0))

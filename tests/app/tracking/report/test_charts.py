@@ -7,6 +7,7 @@ import sys
 import xml.etree.ElementTree as ET
 
 import numpy as np
+import pytest
 from rodsight.tracking.report.charts import Labels, line_chart, stacked_chart
 
 LABELS = Labels("How well < before", "photograph", "ZNCC")
@@ -58,6 +59,7 @@ def test_the_same_chart_has_the_same_bytes() -> None:
     assert first == second
 
 
+@pytest.mark.thorough
 def test_tracking_without_a_report_imports_no_drawing_library() -> None:
     code = "import sys, rodsight.tracking.stage; print([m for m in ('matplotlib', 'jinja2') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

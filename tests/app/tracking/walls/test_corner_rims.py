@@ -56,6 +56,7 @@ def test_the_disc_of_which_most_is_seen_is_chosen() -> None:
     assert find_disc(image, DISC[:2], within=BETWEEN_BARS) == pytest.approx(DISC, abs=2.0 * ACCURACY)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("hidden", "seen"), [(0.3, True), (0.75, False)])
 def test_a_disc_needs_a_part_of_its_rim(hidden: float, seen: bool) -> None:
     found = find_disc(photograph(DISC, hidden=hidden), DISC[:2], within=BETWEEN_BARS)
