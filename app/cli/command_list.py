@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from functools import partial, wraps
+from functools import cache, partial, wraps
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import tyro
@@ -55,7 +55,7 @@ def command_line() -> tyro.extras.SubcommandApp:
     app = tyro.extras.SubcommandApp()
     for commands in GROUPS.values():
         for command in commands:
-            app.command(name=name_of(command))(_deferred(_with_plain_defaults(command)))
+            app.command(name=name_of(command))(_prepared(command))
     return app
 
 
@@ -72,6 +72,12 @@ def command_names() -> list[str]:
 def purpose(command: Command) -> str:
     """Return the first sentence of a command's help."""
     return (inspect.getdoc(command) or "").split("\n\n")[0].replace("\n", " ").removesuffix(".")
+
+
+@cache
+def _prepared(command: Command) -> Callable[..., Callable[[], int]]:
+    """Prepare a command for the parser, once: every further annotation would make each later call slower."""
+    return _deferred(_with_plain_defaults(command))
 
 
 def _with_plain_defaults(command: Command) -> Command:

@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from rodsight.cli.command_list import GROUPS, name_of, overview, purpose
+from rodsight.cli.command_list import GROUPS, command_line, name_of, overview, purpose
 
 from tests.program import rodsight
 
@@ -34,6 +34,14 @@ def test_every_command_has_help_with_an_example_and_units(command, capsys):
             assert f"[{unit}" in meaning[0], f"{option}: {meaning[0]}"
 
 
+@pytest.mark.parametrize("command", COMMANDS, ids=name_of)
+def test_a_command_is_annotated_once_however_often_arguments_are_parsed(command):
+    command_line()
+    before = dict(command.__annotations__)
+    command_line()
+    assert command.__annotations__ == before
+
+
 def test_the_overview_lists_every_command_in_one_line(capsys):
     text = overview()
     for command in COMMANDS:
@@ -57,6 +65,7 @@ def test_the_overview_loads_no_numerics():
     assert done.stdout.strip() == "False"
 
 
+@pytest.mark.thorough
 def test_a_run_reads_its_first_photograph_before_it_imports_the_tracker(made_photographs, tmp_path):
     code = """
 import sys
@@ -73,6 +82,7 @@ main()
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() == "[]"
 
 
+@pytest.mark.thorough
 def test_the_workbench_starts_without_what_only_shows_recordings_or_exports():
     code = "import sys, rodsight.workbench.service.server, rodsight.workbench.command; print(sys.modules.keys() & {%s})"
     heavy = ", ".join(f"'{name}'" for name in ("rerun", "pandas", "matplotlib", "vtk"))
