@@ -12,6 +12,8 @@ from rodsight import run_folder
 from rodsight.cli.commands import view_commands
 from rodsight.experiment.experiment import load_experiment
 from rodsight.out_of_date import out_of_date
+from rodsight.results.manifest import Manifest
+from rodsight.run_folder import RESULTS
 from rodsight.verdicts.log import VERDICTS, Entry, Flag, VerdictLog
 from rodsight.workbench.service.project import Project
 from rodsight.workbench.service.workbench import Workbench
@@ -66,6 +68,21 @@ def test_comments_change_nothing(root):
 def test_a_change_is_a_reason(root, reason):
     CHANGES[reason](root)
     assert reason in out_of_date(root / "runs" / "tracked")
+
+
+def test_a_new_input_is_a_reason(root):
+    manifest = Manifest(root / "runs" / "tracked")
+    piece = manifest.piece(RESULTS)
+    files = {name: checksum for name, checksum in piece["files"].items() if name != "truth_contacts.csv"}
+    manifest.note(RESULTS, piece | {"files": files})
+    assert out_of_date(root / "runs" / "tracked") == ["truth_contacts.csv has been added"]
+
+
+def test_changed_settings_are_named_where_the_input_cannot_be_read(root):
+    edit(root / "tracked" / "experiment.toml", "pressure = 50000.0", 'pressure = "high"')
+    first, second = out_of_date(root / "runs" / "tracked")
+    assert first == "walls.top.pressure was 50000 and is high"
+    assert "its input cannot be read" in second
 
 
 def test_settings_that_are_new_gone_or_many_are_named(root):

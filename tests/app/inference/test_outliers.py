@@ -143,3 +143,24 @@ def test_a_rod_beyond_a_circular_wall_is_an_outlier():
     circle = circle_ends(np.array([[low * PITCH, large - 0.00798]]), np.array([large]), np.zeros(1))
     walls = WallTracks(("ring",), np.tile(circle, (FRAMES, 1, 1, 1)), np.array([np.nan]), side=np.full(1, IN, np.int8))
     assert np.argwhere(find_outliers(tracks, walls)).tolist() == [[2, low]]
+
+
+def test_a_gap_is_not_compared_with_that_of_an_outlier_in_the_photograph_beside():
+    """Both poses overlap the same rod."""
+    moves = [(0, ROD, (2.65e-4, 2.08e-4)), (1, ROD, (-2.09e-4, 8.95e-4))]
+    tracks = replace(sheared_tracks(moves), radius=np.full(N, 0.0079))
+    assert np.argwhere(find_outliers(tracks)).tolist() == [[0, ROD], [1, ROD]]
+
+
+def test_of_two_photographs_the_greater_jump_is_taken_first():
+    """A correct pose beside it deviates too, because its expected position is wrong."""
+    moves = [(3, ROD + 1, (3.3e-5, -8.52e-4)), (3, ROD + SIDE, (-8.49e-4, 6.59e-4)), (4, ROD, (3.8e-5, 5.17e-4))]
+    tracks = replace(sheared_tracks(moves), radius=np.full(N, 0.0079))
+    assert np.argwhere(find_outliers(tracks)).tolist() == [[3, ROD + 1], [3, ROD + SIDE], [4, ROD]]
+
+
+def test_a_jump_in_the_last_photograph_must_be_greater_than_within_the_sequence():
+    radius = np.full(N, 0.00789)
+    last, greater = (sheared_tracks([(FRAMES - 1, ROD, (move, 0.0))]) for move in (2.8e-4, 3.6e-4))
+    assert not find_outliers(replace(last, radius=radius)).any()
+    assert np.argwhere(find_outliers(replace(greater, radius=radius))).tolist() == [[FRAMES - 1, ROD]]

@@ -50,6 +50,13 @@ def test_unseen_rods_follow_the_seen_ones_with_names_and_states_of_their_own(pos
     assert (away.min(axis=0) < 0.05 * poses["radius"][list(GONE)]).all()
 
 
+@pytest.mark.parametrize("row", [0, -1])
+def test_only_known_sizes_are_inferred(poses, row: int) -> None:
+    tracks, walls = tracked(poses, GONE)
+    sizes = np.unique(poses["radius"])[[row]]
+    assert np.isin(add_unseen(tracks, walls, sizes).radius[tracks.grain_count :], sizes).all()
+
+
 def test_a_complete_packing_keeps_its_rods(poses) -> None:
     tracks, walls = tracked(poses, ())
     found = add_unseen(tracks, walls, np.unique(poses["radius"]))

@@ -38,6 +38,8 @@ def test_another_fingerprint_finds_no_frames(tmp_path):
     Checkpoint(tmp_path / "solving", "one").save(0, make_full_results().frames[0])
     assert Checkpoint(tmp_path / "solving", "one").finished() == 1
     assert Checkpoint(tmp_path / "solving", "other").finished() == 0
+    assert [each.name for each in (tmp_path / "solving").iterdir()] == ["fingerprint"]  # it takes no room
+    assert (tmp_path / "solving" / "fingerprint").read_text() == "other"
 
 
 def test_fields_missing_in_an_earlier_version_have_their_defaults(tmp_path, monkeypatch):

@@ -89,6 +89,18 @@ def test_another_packing_is_refused(results):
         compare_runs(results, away)
 
 
+def test_pairs_of_a_truth_may_be_given_in_either_order(results):
+    truth = make_truth(results, np.random.default_rng(3))
+    swapped = np.random.default_rng(4).random(len(truth.i)) < 0.5
+    i, j = np.where(swapped, truth.j, truth.i), np.where(swapped, truth.i, truth.j)
+    given, usual = (
+        compare_with_truth(results, each, name="run").second.frames for each in (replace(truth, i=i, j=j), truth)
+    )
+    for frame, expected_frame in zip(given, usual, strict=True):
+        assert frame.contacts.key.tolist() == expected_frame.contacts.key.tolist()
+        assert frame.fn.tolist() == expected_frame.fn.tolist()
+
+
 def test_truth_is_compared_on_the_same_contacts(results):
     truth = make_truth(results, np.random.default_rng(3))
     comparison = compare_with_truth(results, truth, name="run")

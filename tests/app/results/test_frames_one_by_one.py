@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import gc
 import pickle
+import shutil
 import tracemalloc
 import weakref
 from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from rodsight.results.hdf5.lazy_sequences import CachedSequence
-from rodsight.results.hdf5.reader import StoredFrames
+from rodsight.results.hdf5.reader import CACHED_FRAMES, StoredFrames
 from rodsight.results.hdf5.store import Provenance, load_results, save_results
 
 from tests.app.results.differences import differences
@@ -50,11 +52,17 @@ def full():
     )
 
 
-@pytest.fixture
-def stored(full, tmp_path):
-    file = tmp_path / "results.h5"
+@pytest.fixture(scope="module")
+def saved(full, tmp_path_factory):
+    file = tmp_path_factory.mktemp("saved") / "results.h5"
     save_results(file, full, ORIGIN)
     return file
+
+
+@pytest.fixture
+def stored(saved, tmp_path):
+    """A copy that a test may replace."""
+    return Path(shutil.copy(saved, tmp_path))
 
 
 def test_every_frame_reads_back_unchanged(stored, full):
@@ -69,6 +77,7 @@ def test_every_frame_reads_back_unchanged(stored, full):
         found.frames[FRAMES]
 
 
+@pytest.mark.thorough
 def test_columns_of_one_value_are_read_as_one_value(full, tmp_path):
     shape, file = full.tracks.rotation.shape, tmp_path / "given.h5"
     sigma = np.full(shape, 1e-5)
@@ -83,6 +92,7 @@ def test_columns_of_one_value_are_read_as_one_value(full, tmp_path):
     np.testing.assert_array_equal(load_results(file).tracks.sigma, sigma)
 
 
+@pytest.mark.thorough
 def test_reading_frames_takes_the_memory_of_a_few(stored):
     found = load_results(stored)
 
@@ -101,6 +111,14 @@ def test_reading_frames_takes_the_memory_of_a_few(stored):
     assert one_by_one < 0.5 * all_at_once
 
 
+def test_only_the_most_recent_frames_are_kept(stored):
+    found = load_results(stored).frames
+    items = [weakref.ref(found[k].contacts.i) for k in range(FRAMES)]
+    gc.collect()
+    assert [k for k, item in enumerate(items) if item() is not None] == list(range(FRAMES - CACHED_FRAMES, FRAMES))
+
+
+@pytest.mark.thorough
 def test_a_file_that_is_replaced_meanwhile_is_read_as_it_was_opened(stored, full):
     found = load_results(stored)
     save_results(stored, replace(full, frames=[replace(each, fn=2.0 * each.fn) for each in full.frames]), ORIGIN)

@@ -167,6 +167,18 @@ def test_only_sweeps_that_were_measured_have_rows(results, file):
                 )
 
 
+def test_a_sweep_with_one_measured_residual_has_a_row(results, tmp_path):
+    frames = []
+    for frame in results.frames:
+        unbalance = frame.history.unbalance.copy()
+        unbalance[2] = np.nan
+        frames.append(replace(frame, history=replace(frame.history, unbalance=unbalance)))
+    save_results(tmp_path / "results.h5", replace(results, frames=frames), ORIGIN)
+    with h5py.File(tmp_path / "results.h5") as store:
+        assert store["sweeps/number"][()].tolist() == [0, 2, 4] * 3
+        assert np.isnan(store["sweeps/unbalance"][1])
+
+
 def test_forces_of_kept_sweeps_lie_end_to_end(tmp_path):
     results = make_full_results(sweeps=8, recorded=np.array([0, 3, 7]))
     save_results(tmp_path / "results.h5", results, ORIGIN)
@@ -241,11 +253,12 @@ def test_a_file_of_tracks_reads_back(results, with_walls, tmp_path):
 
 
 def test_large_columns_are_compressed_without_loss(tmp_path):
-    results = make_results(3, 12, 12, sweeps=20)
+    results = make_results(3, 24, 20, sweeps=20)
     save_results(tmp_path / "results.h5", results, ORIGIN)
     assert differences(results, load_results(tmp_path / "results.h5")) == []
     with h5py.File(tmp_path / "results.h5") as store:
         assert store["sweeps/fn"].compression == "gzip"
+        assert len(results.frames[0].history.fn.ravel()) > 2 * store["sweeps/fn"].chunks[0]  # several blocks at once
         assert store["sweeps/fn"].id.get_storage_size() < 0.9 * store["sweeps/fn"].nbytes
 
 

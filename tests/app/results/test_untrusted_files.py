@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import h5py
 import numpy as np
 import pytest
@@ -13,17 +16,38 @@ from tests.app.results.full_results import make_full_results
 ORIGIN = Provenance("print", "experiment.toml", (0, None), {})
 
 
-@pytest.fixture
-def stored(tmp_path):
-    file = tmp_path / "results.h5"
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    file = tmp_path_factory.mktemp("sound") / "results.h5"
     save_results(file, make_full_results(), ORIGIN)
     return file
+
+
+@pytest.fixture
+def stored(sound, tmp_path):
+    """A copy that a test may spoil."""
+    return Path(shutil.copy(sound, tmp_path))
 
 
 def replace_dataset(file, name, link):
     with h5py.File(file, "r+") as store:
         del store[name]
         store[name] = link
+
+
+@pytest.mark.parametrize("offset", [[0, 9, 4], [1, 4, 9]])
+def test_offsets_that_do_not_ascend_from_zero_are_damage(stored, offset):
+    with h5py.File(stored, "r+") as store:
+        store["contacts/offset"][:3] = offset
+    with pytest.raises(InputError, match="contacts/offset: does not ascend from 0"):
+        load_results(stored)
+
+
+def test_a_sweep_beyond_those_of_its_frame_is_damage(stored):
+    with h5py.File(stored, "r+") as store:
+        store["sweeps/number"][-1] = store["sweeps/count"][-1]
+    with pytest.raises(InputError, match="sweeps/number: names a sweep beyond"):
+        load_results(stored)
 
 
 def test_a_link_to_another_file_is_not_followed(stored, tmp_path):
@@ -74,3 +98,14 @@ def test_a_friction_below_zero_is_damage(stored):
         store.attrs["friction"] = -0.25
     with pytest.raises(InputError, match="is no coefficient of friction"):
         load_results(stored)
+
+
+def test_states_are_read_by_their_names_whatever_their_numbers(stored):
+    expected = [frame.state.tolist() for frame in load_results(stored).frames]
+    with h5py.File(stored, "r+") as store:
+        values = store["contacts/state"][()]
+        named = h5py.check_enum_dtype(store["contacts/state"].dtype)
+        other = {name: 9 - number for name, number in named.items()}
+        del store["contacts/state"]
+        store.create_dataset("contacts/state", data=9 - values, dtype=h5py.enum_dtype(other, basetype=np.uint8))
+    assert [frame.state.tolist() for frame in load_results(stored).frames] == expected

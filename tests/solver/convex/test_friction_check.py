@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rodsight.solver.convex import friction_check
+from rodsight.solver.convex.ensemble_members import measured_slip
 from rodsight.solver.convex.friction_check import on_better_contacts, sliding_frame
 from rodsight.solver.convex.program import solve_convex_member
 from rodsight.solver.detection.touch_probability import ContactProbabilitySettings, probable_contacts
@@ -35,6 +38,17 @@ def test_a_strong_contact_that_was_not_detected_is_added(monkeypatch: pytest.Mon
     assert len(row) == 1
     assert 0.3 < found.probability[row[0]] <= 0.95
     assert found.contacts.count == len(found.probability) == len(found.slip)
+
+
+def test_sliding_is_that_between_the_photographs_on_both_sides() -> None:
+    packing, snapshots = sheared_frames(8)
+    turned = np.random.default_rng(1).normal(0.0, 0.1, packing.grains.count)
+    snapshots[FRAME + 1] = replace(snapshots[FRAME + 1], rotation=turned)
+    found = sliding_frame(packing, snapshots, FRAME, force_scale(packing, ChainSettings()), SETTINGS)
+    walls = packing.walls_of(snapshots[FRAME])
+    beside = snapshots[FRAME - 1], snapshots[FRAME + 1]
+    np.testing.assert_array_equal(found.slip, measured_slip(found.contacts, packing.grains, walls, beside))
+    assert np.abs(found.slip).max() > 0.0
 
 
 @pytest.mark.parametrize(

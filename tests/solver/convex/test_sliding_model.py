@@ -338,3 +338,12 @@ def test_a_gap_that_is_nothing_in_either_order_names_no_order(frames, monkeypatc
     found = find_resistance(frames[2], GIVEN)
     assert found is not None
     assert found.cause == ""
+
+
+@pytest.mark.parametrize("material", [{"friction": 0.0}, {"wall_friction": 0.0}])
+def test_without_friction_nothing_is_compared(material, monkeypatch):
+    packing, snapshots = sheared_frames(8)
+    monkeypatch.setattr(resistance, "resisted_frames", lambda *_: pytest.fail("it was compared"))
+    smooth = replace(packing, material=replace(packing.material, **material))
+    unit = force_scale(packing, ChainSettings())
+    assert find_in_sequence(smooth, snapshots, 1, unit, ContactProbabilitySettings(1e-6)) is None

@@ -26,6 +26,7 @@ def detection_of(x: np.ndarray, y: np.ndarray, radius: np.ndarray) -> Detection:
     return Detection(x, y, radius, np.full(len(x), 0.1), np.full(len(x), 0.9))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_missed_discs_are_added_with_their_sizes(kind: str) -> None:
     x, y, radius = lay_row_by_row(10, 10, RADII)
@@ -90,7 +91,6 @@ def test_a_disc_needs_an_edge_and_a_view_of_its_rim(column: int, monkeypatch: py
     assert add_missing_discs(image, given).count == given.count
 
 
-@pytest.mark.screen
 def test_nothing_is_added_to_painted_rods_or_on_painted_bars() -> None:
     image = read_photograph(SAMPLE / "photos" / "0000.jpg")
     table = read_table(SAMPLE / "grains.csv", ("x", "y", "radius"))

@@ -75,16 +75,17 @@ def test_of_two_overlapping_grains_that_of_lower_zncc_is_suspect(lower: int, hig
     assert suspects(registration) == [lower]
 
 
-def test_a_pose_given_by_hand_makes_no_rod_suspect() -> None:
+@pytest.mark.parametrize(("given", "other"), [(3, 4), (4, 3)])
+def test_a_pose_given_by_hand_makes_no_rod_suspect(given: int, other: int) -> None:
     last, moved = grid(5, 5), uniform(8.0)
     moved[3, 0] += 8.0
     moved[4, 0] -= 8.0
     registration = registered(last, moved, 0.95)
-    for row in (4, MIDDLE):
+    for row in (given, MIDDLE):
         registration.results.status[row] = TrackStatus.GIVEN
         registration.results.zncc[row] = np.nan
-    assert 3 not in suspects(registration)  # nothing but a hand supports the pose that overlaps it
-    assert (registration.results.status[[4, MIDDLE]] == TrackStatus.GIVEN).all()
+    assert other not in suspects(registration)  # nothing but a hand supports the pose that overlaps it
+    assert (registration.results.status[[given, MIDDLE]] == TrackStatus.GIVEN).all()
 
 
 def test_lost_grains_are_neither_suspect_nor_neighbours() -> None:
