@@ -109,7 +109,7 @@ def find_corners(image: Image, found: ValidationResult) -> list[Circle]:
     discs = []
     for k, (name, end) in enumerate(ends):
         for other, place in ends[k + 1 :]:
-            if other != name and float(np.hypot(*(place - end))) < MEETING:
+            if float(np.hypot(*(place - end))) < MEETING:
                 disc = find_disc(image, (float(end[0]), float(end[1])), within=BETWEEN_BARS)
                 if disc is not None:
                     discs.append(Circle(_corner_name(name, other), *disc, side="out"))

@@ -1,10 +1,12 @@
 """An experiment is set up from photographs by requests; `rodsight check` reads the same files."""
 
+import io
 import shutil
 import tomllib
 
 import numpy as np
 import pytest
+from PIL import Image
 from rodsight.experiment.experiment import load_experiment, read_grain_guess
 from rodsight.experiment.reading.tables import read_table
 from rodsight.experiment.scaling import make_scale
@@ -306,6 +308,13 @@ def test_the_first_page_shows_photographs_that_wait(visitor):
         answer = visitor.client.get("/thumbnail", params=query)
         assert (answer.status_code, answer.headers["Content-Type"]) == (200, "image/jpeg")
     assert visitor.client.get("/thumbnail", params={"folder": "elsewhere"}).status_code == 422
+
+
+def test_the_first_of_them_stands_for_a_series(visitor, photographs_only):
+    first = photographs_only / "my photographs" / "pictures" / "DSC_7.jpg"
+    Image.new("L", (600, 400)).save(first)
+    answer = visitor.client.get("/thumbnail", params={"folder": "my photographs/pictures", "suffix": ".jpg"})
+    assert np.asarray(Image.open(io.BytesIO(answer.content))).max() < 10
 
 
 def test_photographs_come_as_pictures_of_any_size(begun):

@@ -9,6 +9,7 @@ from rodsight.solver.assessment.expected_correlation import (
     MEASURES,
     WIDEST,
     bound_correlation,
+    correlation_score,
     expect_correlation,
     losses,
     predict_correlation,
@@ -59,6 +60,20 @@ def test_every_table_is_monotone_and_the_score_is_their_sum():
     bound = table["bound"]
     margin = bound["constant"] + bound["score"] * score
     assert bound_correlation(alone) == pytest.approx(max(math.tanh(score - margin), 0.0))
+
+
+def test_the_distance_of_the_bound_follows_the_score(monkeypatch):
+    table = FITTED["expected_correlation"]["both"]
+    monkeypatch.setitem(table, "bound", {"constant": 0.1, "score": 0.2})
+    for each in (BOTH, replace(BOTH, agreement=0.7)):
+        score = correlation_score(each)
+        assert bound_correlation(each) == pytest.approx(math.tanh(0.8 * score - 0.1))
+
+
+def test_a_photograph_beyond_the_range_of_the_fit_counts_as_its_end_in_a_mean():
+    last = FITTED["expected_correlation"]["prediction"]["correction"]["at"][-1]
+    far, end = (replace(BOTH, correction=each) for each in (1e3 * last, last))
+    assert predict_correlation([BOTH, far]) == pytest.approx(predict_correlation([BOTH, end]))
 
 
 def test_a_prediction_reads_the_mean_evidence_and_knows_its_interval():

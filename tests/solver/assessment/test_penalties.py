@@ -71,9 +71,10 @@ def test_a_wide_step_is_named_where_the_force_pattern_is_new():
 
 
 def test_penalties_beside_the_evidence_have_their_size():
-    assert assess(with_information(beyond=4)).trust == pytest.approx(
-        motion_assessment(ASSESSED).trust * (1.0 - BEYOND_WALL_LOSS * 4 / 400)
-    )
+    kept = 1.0 - BEYOND_WALL_LOSS * 4 / 400
+    usual = motion_assessment(ASSESSED)
+    found = assess(with_information(beyond=4))
+    assert found == pytest.approx((kept * usual.expected_correlation, kept * usual.trust))
     chain = replace(with_information(soft=True), disagreement=math.nan)
     assert assess(chain).trust == pytest.approx(motion_assessment(chain).trust * (1.0 - SOFT_CHAIN_LOSS))
 

@@ -40,8 +40,8 @@ def test_wrong_radii_of_hard_grains_are_no_softness(hard, error) -> None:
 
 
 def test_an_overlap_without_variance_of_its_own_is_no_softness(hard) -> None:
-    """All radii are too large by 1.5 σ: the overlap is twice the standard deviation of the gaps, which is the noise."""
+    """The overlap is 2.4 times the standard deviation of the gaps, which is three quarters of the noise."""
     packing = replace(
-        hard.packing, grains=Grains.of_rods(hard.packing.grains.radius + 1.5 * NOISE, density=2700.0, length=0.06)
+        hard.packing, grains=Grains.of_rods(hard.packing.grains.radius + 1.2 * NOISE, density=2700.0, length=0.06)
     )
     assert find_soft_overlap(packing, hard.snapshots) == 0.0
