@@ -38,6 +38,7 @@ def used_internals() -> set[str]:
     return found
 
 
+@pytest.mark.thorough
 def test_the_internals_in_use_are_those_that_are_bounded() -> None:
     assert used_internals() == set(INTERNALS.values())
 

@@ -34,6 +34,7 @@ def test_the_plot_of_the_history_is_up_to_date(tmp_path):
     assert (tmp_path / "drawn.svg").read_text() == history.PICTURE.read_text(), "python -m tests.benchmarks.history"
 
 
+@pytest.mark.thorough
 def test_the_plot_of_the_growth_is_up_to_date(tmp_path):
     jobs = growth.read()
     assert {each.kind for each in jobs} == set(growth.COLOURS)

@@ -53,6 +53,7 @@ def test_the_overview_lists_every_command_in_one_line(capsys):
         assert capsys.readouterr().out == text + "\n"
 
 
+@pytest.mark.thorough
 def test_completion_of_a_shell_is_printed(capsys):
     assert "bash completion" in printed_text(capsys, "--completion", "bash").lower()
     assert rodsight("--completion", "fish") == 2

@@ -39,6 +39,7 @@ def test_the_sample_is_small_enough_to_commit():
     assert sum(file.stat().st_size for file in SAMPLE.rglob("*") if file.is_file()) <= 20e6
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("frame", [0, 12])
 def test_photographs_are_rendered_again_from_the_truth(frame):
     tracks = read_table(SAMPLE / "truth_tracks.csv", ("frame", "id", "x", "y", "theta"))

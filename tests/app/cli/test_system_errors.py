@@ -13,6 +13,7 @@ from tests.program import rodsight
 FEW = ("--set", "solver.estimator=nlgs", "--set", "solver.sweeps=20", "--sweeps", "none", "--quiet")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EACCES])
 def test_a_file_that_cannot_be_written_is_one_line(tracked, tmp_path, capsys, monkeypatch, number):
     def refuse(self: Path, content: bytes) -> int:

@@ -70,6 +70,7 @@ def test_the_site_lists_all_pages():
     assert {file.name for file in FOLDER.glob("*.md")} == set(pages())
 
 
+@pytest.mark.thorough
 def test_every_link_has_a_target_and_no_page_loads_from_another_site(tmp_path):
     write_pages(tmp_path)
     found = {file.name: Page(file) for file in tmp_path.glob("*.html")}

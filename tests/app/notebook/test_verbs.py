@@ -77,6 +77,7 @@ def test_tracks_solve_to_the_same_forces(made_tracks, run, tmp_path):
     pd.testing.assert_frame_equal(solved.contacts(), run.contacts())
 
 
+@pytest.mark.thorough
 def test_score_equals_the_command_and_accepts_a_table(made_tracks, run, capsys):
     scores = rodsight.score(run)
     assert command("score", str(run.file.parent), "--json") == 0

@@ -33,6 +33,7 @@ def test_input_is_checked_and_forces_are_inferred_with_one_thread() -> None:
         assert hasattr(function, "__wrapped__")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("name", "usual"), [("OPENBLAS_NUM_THREADS", "1"), ("MIMALLOC_PURGE_DELAY", "0")])
 def test_the_command_sets_up_the_libraries_that_it_loads_unless_the_user_has(name: str, usual: str) -> None:
     code = (

@@ -158,6 +158,7 @@ def test_without_a_dataset_that_is_not_essential_a_file_opens(path, new_file, wh
         assert np.array_equal(values, [kept.absent] * len(part), equal_nan=True)
 
 
+@pytest.mark.thorough
 def test_a_file_of_nothing_but_essentials_opens_records_and_exports(new_file, tmp_path):
     with h5py.File(new_file, "a") as store:
         for path in OTHERS:

@@ -125,6 +125,7 @@ def test_a_file_that_is_replaced_meanwhile_is_read_as_it_was_opened(stored, full
     assert np.array_equal(found.frames[7].fn, full.frames[7].fn)
 
 
+@pytest.mark.thorough
 def test_frames_can_be_pickled(stored, full):
     found = pickle.loads(pickle.dumps(load_results(stored)))
     assert np.array_equal(found.frames[5].fn, full.frames[5].fn)
@@ -143,6 +144,7 @@ def test_frames_are_freed_with_their_last_use_and_not_at_a_later_collection(stor
         gc.enable()
 
 
+@pytest.mark.thorough
 def test_kinematics_of_a_frame_are_read_alone_and_are_those_of_all_frames(full, tmp_path, monkeypatch):
     few = make_full_results()
     save_results(tmp_path / "results.h5", few, ORIGIN)

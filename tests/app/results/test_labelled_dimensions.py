@@ -64,6 +64,7 @@ def test_a_run_without_any_contact_opens(engine, tmp_path):
     assert tree["contacts/normal"].dims == ("contact", "xy")
 
 
+@pytest.mark.thorough
 def test_a_file_of_tracks_opens(engine, tmp_path):
     results = make_full_results()
     save_tracks(tmp_path / "tracks.h5", "fake", results.tracks, None, ORIGIN)

@@ -61,7 +61,7 @@ def thinned(results: Results, rng: np.random.Generator) -> Results:
     return replace(results, frames=frames)
 
 
-@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     seed=st.integers(0, 2**32 - 1),
     frame_count=st.integers(1, 4),
@@ -190,6 +190,7 @@ def test_forces_of_kept_sweeps_lie_end_to_end(tmp_path):
             assert np.array_equal(store[f"sweeps/{name}"][()], laid), name
 
 
+@pytest.mark.thorough
 def test_members_are_named_and_absent_where_a_frame_has_none(results, file, tmp_path):
     with h5py.File(file) as store:
         assert store["members/force"].attrs["member"].tolist() == list(MEMBERS)
@@ -198,6 +199,7 @@ def test_members_are_named_and_absent_where_a_frame_has_none(results, file, tmp_
     assert [frame.member_force for frame in load_results(tmp_path / "results.h5").frames] == [None] * 3
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("size", [0, 5])
 def test_standard_deviations_are_stored_with_their_source(results, size, tmp_path):
     save_results(tmp_path / "results.h5", replace(results, ensemble_size=size), ORIGIN)
@@ -219,6 +221,7 @@ def test_datasets_have_their_unit_as_an_attribute(path, unit, file):
         assert store[path].attrs.get("unit") == unit
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("frames", [(0, None), (2, 5), (0, 9, 4)])
 def test_the_provenance_of_a_file_reads_back(results, frames, tmp_path):
     origin = replace(ORIGIN, frames=frames)

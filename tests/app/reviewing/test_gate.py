@@ -175,6 +175,7 @@ def test_a_long_request_is_not_read(server):
     assert request(server, "POST", "/api/judge", {"reviewer": "x" * 300_000}, **own(server))[0] == 413
 
 
+@pytest.mark.thorough
 def test_the_viewer_comes_from_the_installed_wheel(server):
     status, headers, module = request(server, "GET", "/viewer/module.wasm", **own(server))
     assert (status, headers["Content-Type"]) == (200, "application/wasm")

@@ -67,6 +67,7 @@ def test_lower_friction_lowers_the_macroscopic_friction_angle(nominal):
     assert low.friction_angle_change < high.friction_angle_change
 
 
+@pytest.mark.thorough
 def test_inputs_that_were_not_varied_have_the_trust_of_the_run(nominal):
     again = infer(nominal.inputs)
     np.testing.assert_array_equal(again.trust, nominal.networks.trust)

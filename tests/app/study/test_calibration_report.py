@@ -47,6 +47,7 @@ def test_only_quantities_outside_their_limits_are_named(study):
     assert any("sliding contacts is off by +30 %" in each for each in violations(replace(study, numbers=numbers)))
 
 
+@pytest.mark.thorough
 def test_the_page_names_version_seeds_and_the_hash_of_its_data(study):
     page = report_page(study)
     assert study.data_hash in page

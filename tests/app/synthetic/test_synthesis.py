@@ -314,6 +314,7 @@ def test_rods_of_the_apparatus_are_in_balance_while_it_moves(apparatus: Synthesi
     assert np.linalg.norm(np.diff(truth.position, axis=0), axis=2).mean() > 1e-5
 
 
+@pytest.mark.thorough
 def test_corner_discs_are_photographed(tmp_path: Path) -> None:
     made = synthesize(
         tmp_path / "lab", SynthesisSettings(preset="1g2e", grains=30, frames=1, pixel_size=5e-4, png=True)

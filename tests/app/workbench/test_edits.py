@@ -59,6 +59,7 @@ def test_edges_that_no_rod_touches_or_that_cut_rods_are_no_walls(monkeypatch):
     assert np.abs(sides - [100.0, 120.0, 20.0, 20.0]) == pytest.approx([0.5, 0.0, 0.0, 0.5], abs=0.05)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("enlarged", [1, 2])
 def test_a_circle_drawn_beside_its_rim_snaps_to_it_on_a_large_photograph_too(disc, enlarged):
     large = np.kron(disc, np.ones((enlarged, enlarged), np.float32))

@@ -89,6 +89,7 @@ def discs(folder, columns: int = 6, rows: int = 5, radius: float = 24.0) -> None
         cv2.imwrite(str(folder / f"shots/{k}.png"), np.clip(picture + noise, 0, 255).astype(np.uint8))
 
 
+@pytest.mark.thorough
 def test_channel_region_outline_and_range_of_radii_are_used(tmp_path, capsys):
     discs(tmp_path)
     flags = ("--photographs", "shots/*.png", "--interval", 5, "--pixel-size", 1e-4, "--quiet")

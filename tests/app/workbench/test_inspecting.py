@@ -119,6 +119,7 @@ def test_a_verdict_reaches_the_solver_and_is_undone(solved):
     assert decided.count == 0
 
 
+@pytest.mark.thorough
 def test_a_verdict_stays_with_its_photograph_when_the_order_changes(solved):
     visitor, at, _, folder = solved
     names = visitor.request("project", at=at)["series"]["names"]
@@ -171,6 +172,7 @@ def test_forces_without_a_contact_differ_and_nothing_is_written(solved):
     assert "no contact" in visitor.refused("without_contact", at=at, frame=SHOWN, i=pair["i"], j=pair["i"])
 
 
+@pytest.mark.thorough
 def test_reviewers_are_compared_with_each_other_and_with_the_detector(solved):
     visitor, at, _, _ = solved
     assert visitor.request("agreement", at=at) == {
@@ -358,6 +360,7 @@ def test_the_motion_of_rods_is_that_of_their_tracks(solved):
     assert "is not solved" in visitor.refused("motion", at=at, frame=last, since=FIRST - 1)
 
 
+@pytest.mark.thorough
 def test_the_motion_over_the_window_is_that_of_the_results(solved):
     visitor, at, results, folder = solved
     tracks, last = results.tracks, FIRST + len(results.frames) - 1

@@ -200,6 +200,7 @@ def test_how_the_camera_was_held_is_stated_and_used_only_on_request(begun):
     assert "notes on how it was held differ" in messages(visitor.request("project", at=at))
 
 
+@pytest.mark.thorough
 def test_everything_that_is_drawn_goes_with_a_rotation(begun, made_photographs):
     visitor, at, folder = begun
     (folder / "grains.csv").write_bytes((made_photographs / "grains.csv").read_bytes())

@@ -40,6 +40,7 @@ def test_photographs_of_no_experiment_become_one(begun, photographs_only):
     }  # fmt: skip
 
 
+@pytest.mark.thorough
 def test_the_quality_of_photographs_is_measured_once(begun, monkeypatch):
     visitor, described = begun
     measured: list[bool] = []

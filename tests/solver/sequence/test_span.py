@@ -60,6 +60,7 @@ def test_a_frame_continues_the_forces_of_the_frame_where_its_motion_begins(monke
         assert not np.array_equal(continued[k].soft.force, solved[k - 1][1].members.soft.force)
 
 
+@pytest.mark.thorough
 def test_what_is_counted_by_photographs_is_still_counted_so():
     one, three = solve(ONE), solve(THREE)
     for (single, _), (spanned, state) in zip(one, three, strict=True):

@@ -46,6 +46,7 @@ def test_a_shared_recording_is_smaller_complete_and_has_the_same_forces(recordin
     assert layout == replace(former, frame_count=2)
 
 
+@pytest.mark.thorough
 def test_only_the_sweeps_of_the_shared_frames_are_in_it(recording, results, tmp_path):
     path = share_recording(recording.path, tmp_path / "small.rrd", first=1, stop=3).path
     start = results.frames[0].history.count + 1
@@ -55,6 +56,7 @@ def test_only_the_sweeps_of_the_shared_frames_are_in_it(recording, results, tmp_
     assert rows(path, entities.SUMMARY)
 
 
+@pytest.mark.thorough
 def test_smaller_photographs_cover_the_same_area(recording, tmp_path):
     import cv2
 

@@ -24,6 +24,7 @@ def solved(made_tracks: Path, tmp_path_factory: pytest.TempPathFactory) -> Resul
     return pipeline.solve(pipeline.Run(experiment, tmp_path_factory.mktemp("solved")))
 
 
+@pytest.mark.thorough
 def test_the_recording_has_warm_cold_and_final_residuals_of_every_frame(solved: Results, tmp_path: Path):
     path = write_recording(solved, tmp_path / "run.rrd").path
     for forces in solved.frames:

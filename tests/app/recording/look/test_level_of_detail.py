@@ -54,6 +54,7 @@ def test_fewer_sweeps_but_at_least_the_minimum_are_recorded_of_many_rods():
     assert level_of_detail.kept_sweeps(40, 100_000) == 20
 
 
+@pytest.mark.thorough
 def test_a_recording_reports_its_reductions_and_draws_no_more(small_limits, tmp_path, monkeypatch):
     results = make_results(frame_count=2)
 

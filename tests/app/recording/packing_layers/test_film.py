@@ -67,6 +67,7 @@ def test_the_film_of_sweeps_ends_with_the_reported_forces(recording, results):
     assert inside.all(axis=1).sum() == np.sum(results.frames[1].fn > strong)
 
 
+@pytest.mark.thorough
 def test_a_shared_recording_has_only_the_pictures_of_its_frames(recording, tmp_path):
     path = share_recording(recording.path, tmp_path / "small.rrd", first=1, stop=3).path
     there = [frame for frame in range(4) if rows(path, f"{entities.FILM_FRAMES}/{frame}")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.tabs.summary_tab import MAX_REASONS
 from rodsight.solver.boundary.camera_distortion import CameraDistortion
@@ -36,6 +37,7 @@ def test_the_summary_lists_the_reasons_that_lower_the_trust_and_their_cures(tmp_
     assert "Reasons that lower T" in text
 
 
+@pytest.mark.thorough
 def test_the_summary_lists_the_reasons_of_the_least_trusted_frames_only(tmp_path):
     count = MAX_REASONS + 3
     frames = [
@@ -50,6 +52,7 @@ def test_a_summary_without_reasons_has_no_list(tmp_path):
     assert "Reasons that lower T" not in summary_of(make_results(2, sweeps=2).frames, tmp_path / "run.rrd")
 
 
+@pytest.mark.thorough
 def test_the_summary_states_the_camera_with_intervals_where_it_was_sought(tmp_path):
     results = make_results(2, sweeps=2)
     value, sd = np.zeros(10), np.full(10, 2e-4)

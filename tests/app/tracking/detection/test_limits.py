@@ -84,6 +84,7 @@ def test_sigma_covers_a_one_sided_shadow() -> None:
     assert np.sqrt(((error / found.sigma[:, None]) ** 2).mean()) < 1.5
 
 
+@pytest.mark.thorough
 def test_a_circle_hardly_in_view_is_not_guessed() -> None:
     x, y, radius = np.array([150.0, -18.0]), np.array([150.0, 140.0]), np.array([60.0, 60.0])
     image = photograph(Laboratory(), x, y, radius)

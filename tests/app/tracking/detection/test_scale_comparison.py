@@ -42,6 +42,7 @@ def test_packed_grains_are_not_looked_for_at_another_scale(speckled, monkeypatch
     assert find_other_scale(speckled, (float(RADIUS),), found) is None
 
 
+@pytest.mark.thorough
 def test_few_grains_in_a_wide_picture_are_no_other_scale():
     image = np.full((600, 600), 20, np.uint8)
     for x, y in ((100, 120), (480, 150), (300, 300), (90, 470), (500, 500), (320, 80)):

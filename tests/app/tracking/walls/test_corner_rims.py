@@ -38,6 +38,7 @@ def test_a_disc_is_measured_where_bars_meet(away: tuple[float, float]) -> None:
     assert found == pytest.approx(DISC, abs=ACCURACY)
 
 
+@pytest.mark.thorough
 def test_a_click_anywhere_on_a_disc_finds_it_and_a_meeting_of_bars_only_its_centre() -> None:
     image, (x, y, radius) = photograph(DISC), DISC
     click = x + 0.5 * radius, y - 0.4 * radius

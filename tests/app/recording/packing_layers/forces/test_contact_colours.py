@@ -32,6 +32,7 @@ def test_every_contact_has_a_colour_by_every_quantity_and_grey_if_unknown(tmp_pa
     assert second["sliding"][0] != second["sliding"][-1]
 
 
+@pytest.mark.thorough
 def test_the_change_is_that_of_each_contact_since_the_frame_before(tmp_path):
     frames = make_results(2, sweeps=20).frames
     same = replace(frames[0], frame=1)
