@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -211,6 +211,20 @@ def test_scale_of_the_forces_moves_by_the_plain_posterior(case):
         assert one.random() == two.random()
         scales.append(state.fn.sum() / before)
     assert len(set(scales)) > 2
+
+
+def test_a_known_compliance_pulls_the_scale_of_the_forces_towards_it(case):
+    narrow = replace(case, model=case.model._replace(compliance_mean=0.05, compliance_sd=0.002))
+    found = []
+    for seed in range(6):
+        state = sampled_state(narrow)
+        state.common[0] = 0.045
+        one, two = np.random.default_rng(seed), np.random.default_rng(seed)
+        plain = narrow.plain.draw_scale(two, plain_of(narrow, state))
+        draw_scale(one, narrow.pairs, narrow.grains, narrow.model, state)
+        assert_same(narrow, state, plain)
+        found.append(state.common[0])
+    assert 0.047 < np.mean(found) < 0.053
 
 
 def test_without_bearing_pairs_no_scale_is_drawn(case):
