@@ -42,8 +42,40 @@ def ascending_order(values):
 @njit(cache=True, nogil=True)
 def median(values):
     """Return the median of values (n,) without NaN, n ≥ 1."""
-    order = ascending_order(values)
     half = len(values) // 2
+    work = values.copy()
+    upper = select(work, half)
     if len(values) % 2:
-        return values[order[half]]
-    return (values[order[half - 1]] + values[order[half]]) / 2
+        return upper
+    lower = work[0]
+    for k in range(1, half):
+        lower = max(lower, work[k])
+    return (lower + upper) / 2
+
+
+@njit(cache=True, nogil=True)
+def select(values, place):
+    """Return the value at a place of the ascending order of values (n,) without NaN, by Hoare's selection.
+
+    The values are rearranged: none before the place is greater, none after it less.
+    """
+    low, high = 0, len(values) - 1
+    while low < high:
+        pivot = values[(low + high) // 2]
+        i, j = low, high
+        while i <= j:
+            while values[i] < pivot:
+                i += 1
+            while pivot < values[j]:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i += 1
+                j -= 1
+        if place <= j:
+            high = j
+        elif place >= i:
+            low = i
+        else:
+            break
+    return values[place]

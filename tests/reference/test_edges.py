@@ -2,10 +2,14 @@
 
 import numpy as np
 import pytest
+from rodsight.tracking.detection.discs import find_highest, measure_distances
 from rodsight.tracking.detection.edges import centre_variance, find_steepest
-from rodsight.tracking.detection.rim_profile import locate_edges
+from rodsight.tracking.detection.rim_profile import locate_edges, write_normal
 from rodsight.tracking.detection.rings import without_overlap
+from rodsight.tracking.short_sort import median, select
+from scipy.ndimage import distance_transform_edt, maximum_filter
 from scipy.optimize import least_squares
+from scipy.stats import norm
 
 from tests.reference.twins.circles import fitted_circle
 from tests.reference.twins.edges import apart, circle_step, rim, rim_misfit, sandwich_variance, steepest
@@ -13,6 +17,8 @@ from tests.reference.twins.edges import apart, circle_step, rim, rim_misfit, san
 pytestmark = pytest.mark.unit
 
 CONVERGED = 2e-4  # [px] a fit ends at steps below a ten-thousandth
+SERIES = 1e-11  # error of the normal distribution's series within a node of its table
+LIMIT = 2e-9  # rest of the distribution beyond the end of its table
 SAME = 5e-3  # [px] Gauss-Newton ends at steps below a thousandth
 
 
@@ -113,3 +119,48 @@ def test_the_variance_of_a_centre_is_that_of_the_scores(scatter):
     inverse = root @ root.T
     expected = sandwich_variance(score, np.bincount(stretch, w), inverse, 0.07, scatter)
     assert centre_variance(angle, radius, w, score, inverse, 0.07, scatter) == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_tabulated_normal_distribution_is_the_plain_one():
+    t = np.concatenate([np.linspace(-5.99, 5.99, 4001), [-np.inf, -1e9, -6.1, 6.1, 1e9, np.inf]])
+    cumulative, density = np.empty(len(t)), np.empty(len(t))
+    write_normal(t, cumulative, density)
+    assert cumulative[:4001] == pytest.approx(norm.cdf(t[:4001]), abs=SERIES)
+    assert density[:4001] == pytest.approx(norm.pdf(t[:4001]), abs=SERIES)
+    assert cumulative[4001:] == pytest.approx([0.0] * 3 + [1.0] * 3, abs=LIMIT)
+    assert density[4001:] == pytest.approx(0.0, abs=10.0 * LIMIT)
+
+
+def test_distances_to_the_dark_are_the_plain_ones():
+    rng = np.random.default_rng(12)
+    bright = (rng.uniform(size=(60, 90)) < 0.995).astype(np.uint8)
+    bright[:, :30] = 1  # columns without any dark
+    centres = (bright * (rng.uniform(size=bright.shape) < 0.3)).astype(np.uint8)
+    distance = np.zeros(bright.shape, np.float32)
+    measure_distances(bright, centres, np.empty(bright.shape, np.int32), distance)
+    expected = np.where(centres > 0, distance_transform_edt(bright), 0.0).astype(np.float32)
+    assert distance.tolist() == expected.tolist()
+    measure_distances(np.ones_like(bright), centres, np.empty(bright.shape, np.int32), distance)
+    assert np.isinf(distance[centres > 0]).all()
+
+
+def test_the_highest_pixels_are_the_plain_ones():
+    rng = np.random.default_rng(13)
+    distance = rng.integers(0, 12, (40, 50)).astype(np.float32)  # many equal ones
+    expected = np.argwhere((distance == maximum_filter(distance, 3)) & (distance >= 8.0))
+    places = np.empty((len(expected), 2), np.intp)
+    assert find_highest(distance, np.float32(8.0), places) == len(expected)
+    assert places.tolist() == expected.tolist()
+    assert find_highest(distance, np.float32(8.0), places[:5]) == len(expected)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 10, 61])
+def test_selected_values_are_those_of_the_sorted_ones(count):
+    rng = np.random.default_rng(count)
+    for values in (rng.normal(size=count), rng.integers(0, 4, count).astype(np.float64), np.arange(count, dtype=float)):
+        assert median(values) == np.median(values)
+        for place in range(count):
+            work = values.copy()
+            assert select(work, place) == np.sort(values)[place]
+            assert (work[:place] <= work[place]).all()
+            assert (work[place:] >= work[place]).all()

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ..short_sort import ascending_order
+from ..short_sort import select
 from .edges import DENSITY, MARGIN, fit_circle, trace
 from .rim_profile import fit_rim
 
@@ -187,11 +187,12 @@ def see_edges(edges, dark, contrast, x, y, excess, seen):
 @njit(cache=True, nogil=True)
 def lowest_tenth(values):
     """Return the tenth percentile of values (p,) without NaN, as numpy interpolates it."""
-    order = ascending_order(values.astype(np.float64))
     place = (len(values) - 1) * 0.1
     low = int(place)
     part = place - low
-    below, above = values[order[low]], values[order[min(low + 1, len(values) - 1)]]
+    work = values.copy()
+    below = select(work, low)
+    above = select(work[low:], min(1, len(values) - 1 - low))
     rise = above - below
     if part >= 0.5:
         return above - rise * values.dtype.type(1.0 - part)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numba import njit
 
 from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
@@ -20,6 +21,12 @@ from .rings import Circles, without_overlap
 # Distances are measured on a photograph enlarged by this factor, unless it has more pixels than that, to save memory.
 ENLARGED = 2
 ENLARGED_PIXELS = 12_000_000
+
+# Distances are measured pixel by pixel where those that may be centres of discs are fewer than this fraction of all:
+# in the passes over the bright area that the found discs leave.
+FEW_CENTRES = 0.01
+
+FIRST_PLACES = 1 << 16  # highest distances that a first search has room for
 
 # Relative light (0 dark, 1 bright) above which a pixel belongs to a grain.
 BRIGHT = 0.5
@@ -59,15 +66,14 @@ def find_discs(level: Image, found: Array, smallest: float) -> Discs:
         bright, _enlarged(found[:, 0], factor), _enlarged(found[:, 1], factor), factor * (found[:, 2] + RIM), 0
     )
     least = factor * smallest
-    if not _may_hold_disc(bright, least):
+    # Without a disc, distances to the dark take most of the time of the last pass over a photograph.
+    centres = _possible_centres(bright, least)
+    if not centres.any():
         return Discs(Circles(*np.empty((5, 0))), 0.0, 0.0, np.inf)
+    distance = _distance_to_dark(bright, centres)
     # The distance between the centres of a pixel and the nearest dark one exceeds that to the edge by half a pixel.
-    distance = cv2.distanceTransform(bright, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     inner = (distance >= least + 0.5).view(np.uint8)
-    highest = cv2.compare(distance, cv2.dilate(distance, np.ones((3, 3), np.uint8)), cv2.CMP_EQ)
-    peak = cv2.bitwise_and(highest, inner)
-    peaks = np.asarray(cv2.findNonZero(peak) if peak.any() else [], np.int64).reshape(-1, 2)
-    column, row = peaks[:, 0], peaks[:, 1]
+    row, column = _highest(distance, np.float32(least + 0.5))
     radius = distance[row, column].astype(np.float64) - 0.5
     order = np.argsort(-radius, kind="stable")
     column, row, radius = column[order].astype(np.float64), row[order].astype(np.float64), radius[order]
@@ -84,14 +90,82 @@ def find_discs(level: Image, found: Array, smallest: float) -> Discs:
     return Discs(candidates, area / factor**2, covered / max(area, 1), light_range)
 
 
-def _may_hold_disc(bright: np.ndarray, radius: float) -> bool:
-    """Whether a disc may fit into the bright area: whether the largest square inside such a disc does, which is quick.
+def _possible_centres(bright: np.ndarray, radius: float) -> np.ndarray:
+    """Mask of the pixels about which the largest square inside a disc of a radius lies in the bright area.
 
-    Without a disc, distances to the dark take most of the time of the last pass over a photograph.
+    It contains the centres of all such discs and is found quickly.
     """
     half = int(np.ceil((radius + 0.5) / np.sqrt(2.0))) - 1
-    square = np.ones((2 * half + 1, 2 * half + 1), np.uint8)
-    return bool(cv2.erode(bright, square).any())
+    return cv2.erode(bright, np.ones((2 * half + 1, 2 * half + 1), np.uint8))
+
+
+def _distance_to_dark(bright: np.ndarray, centres: np.ndarray) -> Image:
+    """Distance of every bright pixel from the nearest dark one (H, W) [px]; where centres are few, of these alone."""
+    if np.count_nonzero(centres) > FEW_CENTRES * centres.size:
+        return np.asarray(cv2.distanceTransform(bright, cv2.DIST_L2, cv2.DIST_MASK_PRECISE), np.float32)
+    distance = np.zeros(bright.shape, np.float32)
+    measure_distances(bright, centres, np.empty(bright.shape, np.int32), distance)
+    return distance
+
+
+@njit(cache=True, nogil=True)
+def measure_distances(bright, centres, vertical, distance):
+    """Write the distance (H, W) [px] of the pixels in `centres` from the nearest dark one, infinite without any.
+
+    vertical (H, W) is workspace: distances in every column.
+    """
+    rows, columns = bright.shape
+    far = rows + columns
+    for i in range(columns):
+        vertical[0, i] = far if bright[0, i] else 0
+    for j in range(1, rows):
+        for i in range(columns):
+            vertical[j, i] = min(vertical[j - 1, i] + 1, far) if bright[j, i] else 0
+    for j in range(rows - 2, -1, -1):
+        for i in range(columns):
+            vertical[j, i] = min(vertical[j, i], vertical[j + 1, i] + 1)
+    for j in range(rows):
+        for i in range(columns):
+            if not centres[j, i]:
+                continue
+            least = np.int64(vertical[j, i]) ** 2
+            step = 1
+            while step * step < least and (step <= i or i + step < columns):
+                if step <= i:
+                    least = min(least, np.int64(vertical[j, i - step]) ** 2 + step * step)
+                if i + step < columns:
+                    least = min(least, np.int64(vertical[j, i + step]) ** 2 + step * step)
+                step += 1
+            distance[j, i] = np.sqrt(np.float32(least)) if least < far * far else np.inf
+
+
+def _highest(distance: Image, least: np.float32) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns, in this order, of the pixels that no neighbour exceeds, with at least a distance."""
+    places = np.empty((FIRST_PLACES, 2), np.intp)
+    while (count := find_highest(distance, least, places)) > len(places):
+        places = np.empty((count, 2), np.intp)
+    return places[:count, 0], places[:count, 1]
+
+
+@njit(cache=True, nogil=True)
+def find_highest(distance, least, places):
+    """Write row and column of the pixels that no neighbour exceeds, as far as places (n, 2) suffices; count all."""
+    rows, columns = distance.shape
+    count = 0
+    for j in range(rows):
+        for i in range(columns):
+            here = distance[j, i]
+            if here < least or distance[j, max(i - 1, 0)] > here or distance[j, min(i + 1, columns - 1)] > here:
+                continue
+            highest = True
+            for y in (max(j - 1, 0), min(j + 1, rows - 1)):
+                for x in range(max(i - 1, 0), min(i + 2, columns)):
+                    highest = highest and distance[y, x] <= here
+            if highest:
+                if count < len(places):
+                    places[count, 0], places[count, 1] = j, i
+                count += 1
+    return count
 
 
 def _full_disc(radius: float) -> np.ndarray:
@@ -105,6 +179,6 @@ def _enlarged(place: Array, factor: int) -> Array:
 
 
 def _paint_discs(mask: np.ndarray, x: Array, y: Array, radius: Array, value: int) -> None:
-    for one in zip(x, y, radius, strict=True):
-        column, row, size = (round(16.0 * float(part)) for part in one)
-        cv2.circle(mask, (column, row), max(size, 0), value, -1, cv2.LINE_8, 4)
+    table = np.rint(16.0 * np.stack([x, y, np.maximum(radius, 0.0)], axis=1)).astype(np.intp)
+    for column, row, size in table.tolist():
+        cv2.circle(mask, (column, row), size, value, -1, cv2.LINE_8, 4)

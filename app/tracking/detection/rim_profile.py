@@ -36,6 +36,24 @@ PAINT_SLOPE = 0.25
 MISFIT = 3.0
 FAR = 6.0  # widths of the blur beyond which an edge is neglected: 1e-9 of it remains
 
+# Nodes of the table of the normal distribution per unit of t: series of five terms about the nearest one have errors
+# below 1e-11, and take a fifth of the time of the error function.
+NODES = 64
+TABLE_END = FAR + 1.0 / NODES
+LANES = 8  # numbers of a vector instruction, of which whole ones are computed
+
+
+def _tabulate_normal() -> tuple[Array, Array]:
+    """Distribution Φ and density φ at t = −TABLE_END + k / NODES, which end at FAR."""
+    t = np.arange(2 * round(TABLE_END * NODES) + 1) / NODES - TABLE_END
+    cumulative = np.array([0.5 * math.erfc(-each * math.sqrt(0.5)) for each in t])
+    density = np.exp(-0.5 * t * t) / math.sqrt(2.0 * math.pi)
+    cumulative[[0, -1]], density[[0, -1]] = (0.0, 1.0), 0.0
+    return cumulative, density
+
+
+CUMULATIVE, DENSITIES = _tabulate_normal()
+
 
 def locate_edges(
     rays: Image,
@@ -156,10 +174,32 @@ def _robust_regression(design, value, strength):
     return answer
 
 
+@njit(cache=True, nogil=True)
+def write_normal(t, cumulative, density):
+    """Write the standard normal distribution Φ and its density φ at t (n,), beyond FAR their limits.
+
+    Notes
+    -----
+    Taylor's series about the nearest node t₀ of the table, with φ′ = −t φ.
+    """
+    for k in range(len(t)):
+        clipped = min(max(t[k], -TABLE_END), TABLE_END)
+        node = int((clipped + TABLE_END) * NODES + 0.5)
+        a = node / NODES - TABLE_END
+        d, phi = clipped - a, DENSITIES[node]
+        second, third = a * a - 1.0, a * (3.0 - a * a)
+        fourth = a * a * (a * a - 6.0) + 3.0
+        cumulative[k] = CUMULATIVE[node] + phi * d * (
+            1.0 + d * (-a / 2.0 + d * (second / 6.0 + d * (third / 24.0 + d * fourth / 120.0)))
+        )
+        density[k] = phi * (1.0 + d * (-a + d * (second / 2.0 + d * (third / 6.0 + d * fourth / 24.0))))
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _fit_rays(rays, first, step, start, dark, end, width, inside, outside, expected, slope_scatter, fitted):
     """Gauss-Newton for edge, A, C of every ray; fitted (p, 4): edge, A, C/A, misfit."""
     samples = rays.shape[1]
+    t, cumulatives, densities = np.empty(samples + LANES), np.empty(samples + LANES), np.empty(samples + LANES)
     for p in range(len(start)):
         fitted[p, :] = np.nan
         if not (np.isfinite(start[p]) and np.isfinite(dark[p])):
@@ -181,16 +221,14 @@ def _fit_rays(rays, first, step, start, dark, end, width, inside, outside, expec
             n00, n01, n02, n11, n12, n22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             v0, v1, v2 = 0.0, 0.0, 0.0
             square = 0.0
+            # Whole vectors: those beyond the last sample are not used.
+            padded = (high - low + LANES) // LANES * LANES
+            for k in range(padded):
+                t[k] = (edge - (first + step * (low + k))) / width
+            write_normal(t[:padded], cumulatives, densities)
             for k in range(low, high + 1):
-                t = (edge - (first + step * k)) / width
-                if t > FAR:
-                    cumulative, density = 1.0, 0.0
-                elif t < -FAR:
-                    cumulative, density = 0.0, 0.0
-                else:
-                    cumulative = 0.5 * math.erfc(-t * math.sqrt(0.5))
-                    density = math.exp(-0.5 * t * t) * 0.3989422804014327
-                ramp = width * (t * cumulative + density)
+                cumulative, density = cumulatives[k - low], densities[k - low]
+                ramp = width * (t[k - low] * cumulative + density)
                 e = rays[p, k] - dark[p] - level * cumulative - slope * ramp
                 j0 = level * density / width + slope * cumulative
                 n00 += j0 * j0

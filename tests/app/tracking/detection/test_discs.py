@@ -37,9 +37,28 @@ def test_whether_distances_are_measured_changes_nothing(
     level = level_with_discs((60.0, 60.0, 20.0), (20.3, 20.6, radius))
     excluded = np.array([[60.0, 60.0, 20.0]])
     found = find_discs(level, excluded, smallest)
-    monkeypatch.setattr(discs, "_may_hold_disc", lambda *_: True)
+    monkeypatch.setattr(discs, "_possible_centres", lambda bright, _: bright)
     assert found.area == find_discs(level, excluded, smallest).area
     assert len(found.candidates.x) == len(find_discs(level, excluded, smallest).candidates.x)
+
+
+def test_distances_of_few_centres_are_those_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    level = level_with_discs((60.0, 60.0, 20.0), (20.3, 20.6, 5.0), (0.0, 70.0, 9.0), (116.0, 117.0, 6.4))
+    found = {}
+    for fraction in (0.0, 1.0):  # of all pixels, and of the possible centres alone
+        monkeypatch.setattr(discs, "FEW_CENTRES", fraction)
+        found[fraction] = find_discs(level, NONE, 4.0)
+    assert found[0.0].candidates.radius.tolist() == found[1.0].candidates.radius.tolist()
+    assert found[0.0].candidates.x.tolist() == found[1.0].candidates.x.tolist()
+    assert len(found[0.0].candidates.x) == 4
+    assert (found[0.0].area, found[0.0].covered) == (found[1.0].area, found[1.0].covered)
+
+
+def test_every_highest_distance_is_found_however_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    level = level_with_discs((20.0, 20.0, 8.0), (60.0, 60.0, 8.0), (90.0, 90.0, 8.0))
+    expected = find_discs(level, NONE, 5.0).candidates.x.tolist()
+    monkeypatch.setattr(discs, "FIRST_PLACES", 1)
+    assert find_discs(level, NONE, 5.0).candidates.x.tolist() == expected
 
 
 def test_no_distances_are_measured_where_everything_is_excluded(monkeypatch: pytest.MonkeyPatch) -> None:
