@@ -12,7 +12,7 @@ class TrackingSettings:
 
     follow: Literal["texture", "outline"] = "texture"  # feature of a grain that is tracked
     patch_fraction: float = 0.85  # radius of the correlated disc / radius of the grain; the rim is shaded
-    tolerance: float = 3e-2  # [px] step below which a fit has converged: the next one would be a twentieth of it
+    tolerance: float = 6e-2  # [px] step below which a fit has converged: the next one would be a hundredth of it
     step_limit: int = 25  # Gauss-Newton steps
     search_window: float = 60.0  # [px] half width of the widest search
     margin: float = 0.15  # by which a ZNCC must exceed the greatest accidental one, and that of the second best place

@@ -187,6 +187,65 @@ def fill_coarse(data, coarse):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _project_finely(coefficients, data, corner, place, level, sums):
+    """Interpolate the photograph, less `level`, at the pixels of a patch and project it on the patch's images.
+
+    Parameters
+    ----------
+    coefficients, data
+        As of `fit_rigid`.
+    corner : (2,) tuple of int
+        Column and row that places are relative to, so that single precision suffices.
+    place : (4,) tuple of float32
+        x and y of the centre, relative to the corner [px], cosine and sine of the rotation.
+    level : float
+        Grey level that is subtracted.
+    sums : (4,) array
+        The sums of f, jx, jy and jr times the photograph are added.
+
+    Returns
+    -------
+    tuple of float
+        Sum of the photograph and of its square.
+
+    Notes
+    -----
+    A loop for each spline keeps its constants in registers: a fit takes a tenth less than with one loop for both.
+    """
+    ox, oy, cos, sin = place
+    s0, s1 = 0.0, 0.0
+    for p in range(len(data)):
+        dx, dy = data[p, 0], data[p, 1]
+        x = ox + cos * dx - sin * dy
+        y = oy + sin * dx + cos * dy
+        ix, iy = int(x), int(y)
+        column, row = corner[0] + ix, corner[1] + iy
+        g = read_quintic(coefficients, column, row, x - np.float32(ix), y - np.float32(iy)) - level
+        s0 += g
+        s1 += np.float64(g) * g
+        add_projections(sums, data, p, g)
+    return s0, s1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _project_coarsely(coefficients, data, stride, corner, place, level, sums):
+    """Do as `_project_finely` with the cubic spline's taps at every pixel of a stride."""
+    ox, oy, cos, sin = place
+    s0, s1 = 0.0, 0.0
+    for p in range(0, len(data), stride):
+        dx, dy = data[p, 0], data[p, 1]
+        x = ox + cos * dx - sin * dy
+        y = oy + sin * dx + cos * dy
+        ix, iy = int(x), int(y)
+        column, row = corner[0] + ix, corner[1] + iy
+        g = read_cubic(coefficients, column, row, x - np.float32(ix), y - np.float32(iy)) - level
+        s0 += g
+        s1 += np.float64(g) * g
+        add_projections(sums, data, p, g)
+    return s0, s1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def fit_rigid(
     coefficients, data, coarse, hessian_inverse, radius, max_shift, min_zncc, tolerance, limit, pose, fit, sums
 ):
@@ -238,20 +297,12 @@ def fit_rigid(
         ox, oy = np.float32(pose[0] - bx), np.float32(pose[1] - by)
         cos, sin = np.float32(np.cos(pose[2])), np.float32(np.sin(pose[2]))
         level = coefficients[int(pose[1]), int(pose[0])]
-        s0, s1 = 0.0, 0.0
+        corner, place = (bx, by), (ox, oy, cos, sin)
         sums[:] = 0.0
-        for p in range(0, count, 1 if fine else stride):
-            dx, dy = data[p, 0], data[p, 1]
-            x = ox + cos * dx - sin * dy
-            y = oy + sin * dx + cos * dy
-            ix, iy = int(x), int(y)
-            if fine:
-                g = read_quintic(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy)) - level
-            else:
-                g = read_cubic(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy)) - level
-            s0 += g
-            s1 += np.float64(g) * g
-            add_projections(sums, data, p, g)
+        if fine:
+            s0, s1 = _project_finely(coefficients, data, corner, place, level, sums)
+        else:
+            s0, s1 = _project_coarsely(coefficients, data, stride, corner, place, level, sums)
         used = count if fine else (count + stride - 1) // stride
         power = s1 - s0 * s0 / used
         sf, sx, sy, sr = sums[0], sums[1], sums[2], sums[3]
