@@ -17,7 +17,7 @@ def caption_of_strain(forces: FrameForces) -> str:
     """Return the shear since frame 0, or the change of area where that is greater; empty where not known."""
     area = np.nan if forces.strain is None else float(np.trace(forces.strain))
     if np.isfinite(area) and not abs(area) <= abs(forces.shear):
-        return f"area {100.0 * np.expm1(area):+.2f} %"
+        return f"area {round(100.0 * np.expm1(area), 2) + 0.0:+.2f} %"
     return f"shear {np.degrees(forces.shear):.2f}°" if np.isfinite(forces.shear) else ""
 
 

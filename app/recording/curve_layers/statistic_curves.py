@@ -21,7 +21,7 @@ from ..look.scene import Scene
 from ..look.values import log_scalar, log_scalars
 
 MARKER_SIZE = 4.5  # [px] of the viewer, half of it
-WALLS_IN_ROW = 6  # names of walls in one line of their key
+KEY_WIDTH, LETTER_WIDTH, KEY_MARGIN = 600.0, 8.0, 20.0  # of the key of walls: whole, of a letter, around a name
 KILO, DEGREES = 1e-3, math.degrees(1.0)
 
 
@@ -84,17 +84,29 @@ def log_statistics_styles(stream: rr.RecordingStream, scene: Scene) -> None:
         lines = rr.SeriesLines(colors=hues, names=walls, widths=[2.0] * len(walls))
         points = rr.SeriesPoints(colors=hues, names=walls, markers=markers, marker_sizes=[MARKER_SIZE] * len(walls))
         stream.log(path, lines, points, static=True)
-    columns = min(max(len(walls), 1), WALLS_IN_ROW)
-    places = [
-        np.array([(row % columns + 0.5) * 600.0 / columns, 12.0 + 24.0 * (row // columns)])
-        for row in range(len(walls))
-    ]  # fmt: skip
     named = [f"{MARKERS[marker]} {name}" for marker, name in zip(markers, walls, strict=True)]
-    log_texts(stream, entities.WALL_KEY, list(zip(places, named, hues, strict=True)))
+    log_texts(stream, entities.WALL_KEY, list(zip(_places_of(named), named, hues, strict=True)))
     if scene.walls.force is not None:
         pale = [(*hue[:3], 150) for hue in hues]
         for path in (entities.WALL_NORMAL_RECORDED, entities.WALL_TANGENTIAL_RECORDED):
             stream.log(path, rr.SeriesLines(colors=pale, names=walls, widths=[5.0] * len(walls)), static=True)
+
+
+def _places_of(names: list[str]) -> list[Array]:
+    """Return the middles of names in rows that hold as many as fit."""
+    rows: list[list[float]] = [[]]
+    for name in names:
+        width = LETTER_WIDTH * len(name) + KEY_MARGIN
+        if rows[-1] and sum(rows[-1]) + width > KEY_WIDTH:
+            rows.append([])
+        rows[-1].append(width)
+    places = []
+    for k, widths in enumerate(rows):
+        space = (KEY_WIDTH - sum(widths)) / max(len(widths), 1)  # shared by the names of a row
+        ends = np.cumsum(np.array(widths) + space)
+        middles = ends - 0.5 * (np.array(widths) + space)
+        places += [np.array([middle, 12.0 + 24.0 * k]) for middle in middles]
+    return places
 
 
 def log_statistics(clock: Clock, scene: Scene, statistics: FrameStatistics) -> None:

@@ -72,7 +72,7 @@ class Canvas:
     @property
     def legend_height(self) -> float:
         """Height [px] of the strip below the grains, for legends."""
-        return 0.2 * max(self.height, 0.6 * self.width)
+        return max(0.2 * self.height, 0.225 * self.width)
 
     @property
     def header_height(self) -> float:

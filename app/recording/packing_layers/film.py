@@ -5,8 +5,6 @@ Only the strong contacts of few frames and sweeps are drawn, so that the film is
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
@@ -32,6 +30,7 @@ SWEEP_PICTURES = SWEEP_COLUMNS * ROWS  # greatest number of sweeps, including th
 STEP_DOWN = 1.45  # distance of rows over the height of a picture, with space for a name
 LINE_HEIGHT = 0.1  # of the height of a picture: from line to line above it
 KEY_HEIGHT = 0.22  # of the height of a picture: the strip below all of them, for the legend
+LONGEST_JOIN = 4.0  # mean radii between the ends of two walls that are joined
 STRONG = 1.0  # times the mean f_n of the run: the least force drawn in pictures of frames
 STRONG_SWEEPS = 1.5  # times the mean f_n of the run: the least force drawn in pictures of sweeps
 
@@ -147,15 +146,20 @@ class FilmWriter:
         )
 
     def _outline(self, frame: int) -> Array:
-        """Return walls and joins of straight walls, or the cell, of a frame as lines (l, 2, 2) [px]."""
-        walls = self._scene.walls
+        """Return walls and short joins of straight walls, or the cell, of a frame as lines (l, 2, 2) [px]."""
+        walls, canvas = self._scene.walls, self._scene.canvas
         corners = self._scene.outline(frame)
         circles = [line for line, side in zip(walls.outlines(frame), walls.sides, strict=True) if side != STRAIGHT]
         if circles:
             corners = walls.endpoints[frame, walls.sides == STRAIGHT].reshape(-1, 2)
-        ends: list[Any] = [np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)]
-        ends += [np.stack([line[:-1], line[1:]], axis=1) for line in circles]
-        return self._scene.canvas.points(np.concatenate(ends))
+        straight = canvas.points(np.stack([corners, np.roll(corners, -1, axis=0)], axis=1))
+        if walls.cell is None and walls.count:  # walls need not follow one another around the packing
+            length = np.hypot(*(straight[:, 1] - straight[:, 0]).T)
+            straight = straight[(np.arange(len(straight)) % 2 == 0) | (length < LONGEST_JOIN * self._grain)]
+        pieces = [canvas.points(np.stack([line[:-1], line[1:]], axis=1)) for line in circles]
+        reach = np.array([[canvas.left, canvas.top], [canvas.right, canvas.bottom]])
+        beside = [each[((each >= reach[0]) & (each <= reach[1])).all(axis=(1, 2))] for each in pieces]
+        return np.concatenate([straight, *beside])
 
     def _names(self, at: Array, names: list[str]) -> rr.Points2D:
         """Return the names of pictures, placed above them."""

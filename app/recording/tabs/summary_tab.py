@@ -110,7 +110,8 @@ def _counts(scene: Scene, frames: list[FrameSummary]) -> str:
     length_given = setting(scene.configuration, "material", "length") is not None
     return (
         f"{scene.tracks.frame_count} frames, {scene.grains.count} rods of {1e3 * scene.rod_length:g} mm"
-        f"{'' if length_given else ' (assumed length: the configuration gives none)'}, {scene.walls.count} walls "
+        f"{'' if length_given else ' (assumed length: the configuration gives none)'}, "
+        f"{walls.count} wall{'s' * (walls.count != 1)} "
         f"({'loaded: ' + pressures if pressures else 'none loaded: forces are known up to a factor'}), "
         f"friction {scene.friction:g}. {sum(f.sweeps for f in frames)} sweeps in {len(frames)} frames."
     )

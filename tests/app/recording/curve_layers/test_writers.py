@@ -205,3 +205,15 @@ def test_every_curve_of_the_statistics_has_its_band_and_every_plot_that_shows_it
         assert band == pytest.approx([value - 0.5 * curve.unit, value + 0.5 * curve.unit], nan_ok=True), curve
     view = curve_view("both", [entities.TAIL_EXPONENT, entities.TRUST])
     assert view.contents == [entities.TAIL_EXPONENT + entities.BAND, entities.TAIL_EXPONENT, entities.TRUST]
+
+
+def test_long_names_of_walls_do_not_overlap_in_their_key(tmp_path):
+    results = make_results()
+    walls = replace(results.walls, name=tuple(f"the upper half {name}" for name in results.walls.name))
+    write_recording(replace(results, walls=walls), tmp_path / "run.rrd")
+    key = rows(tmp_path / "run.rrd", entities.WALL_KEY)[-1]
+    places, names = np.array(key["Points2D:positions"]), key["Points2D:labels"]
+    for row in np.unique(places[:, 1]):
+        here = np.flatnonzero(places[:, 1] == row)
+        assert (np.diff(np.sort(places[here, 0])) > 8.0 * max(len(names[k]) for k in here)).all()
+    assert len(np.unique(places[:, 1])) > 1

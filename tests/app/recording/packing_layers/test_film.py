@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rodsight.drawing.force_range import ForceRange
@@ -7,6 +9,7 @@ from rodsight.recording.archive.share import share_recording
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.packing_layers.film import (
+    LONGEST_JOIN,
     PICTURES,
     STRONG,
     STRONG_SWEEPS,
@@ -91,3 +94,13 @@ def test_the_films_are_small(tmp_path):
         if "LineStrips2D:radii" in row
     )
     assert stacked < 0.2 * drawn
+
+
+def test_walls_that_do_not_follow_one_another_are_not_joined_across_the_packing(tmp_path):
+    results = make_results()
+    order = np.array([0, 2, 1, 3])  # bottom, top, right, left: as the halves of a shear box, in no ring
+    walls = replace(results.walls, endpoints=results.walls.endpoints[:, order])
+    write_recording(replace(results, walls=walls), tmp_path / "run.rrd")
+    lines = np.array(latest(tmp_path / "run.rrd", entities.FILM_PLACE, entities.FRAME, 0)["LineStrips2D:strips"])
+    length = np.hypot(*(lines[:, 1] - lines[:, 0]).T)
+    assert np.sum(length > LONGEST_JOIN * read_layout(tmp_path / "run.rrd").canvas.grain_radius) == 4
