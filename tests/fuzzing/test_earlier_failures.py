@@ -14,6 +14,8 @@ from .attempt import attempt, find_problem
 from .cases import FEW
 from .foreign_files import FORMS
 
+pytestmark = pytest.mark.thorough
+
 
 def first_lines(file, **replaced: str) -> None:
     lines = file.read_text().splitlines()
@@ -55,7 +57,6 @@ def test_a_verdict_of_a_wrong_type_is_refused(originals, tmp_path, corrupted):
     assert next(iter(corrupted)) in ended.errors
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize("precision", ["0.01", "0.002"])
 def test_imprecise_positions_are_refused_or_solved_quickly(originals, tmp_path, precision):
     out = tmp_path / "out"
@@ -96,7 +97,6 @@ def test_a_pattern_that_is_too_long_is_refused(originals):
     assert "too long for a name" in ended.errors
 
 
-@pytest.mark.thorough
 def test_devices_and_pipes_are_refused(originals, tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import pytest
 from rodsight.campaigns.charts import draw_over_frames, draw_over_parameter, varied_parameters
 from rodsight.campaigns.collect import setting_of
 from rodsight.campaigns.report import write_report
@@ -50,6 +51,7 @@ def test_an_empty_cell_has_the_value_of_the_experiment():
     assert setting_of(configuration, "solver.kappa") == ""
 
 
+@pytest.mark.thorough
 def test_the_report_lists_every_run_and_draws_its_results(tmp_path):
     names = [f"run-{k}" for k in range(40)]
     for name in names:

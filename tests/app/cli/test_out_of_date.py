@@ -109,6 +109,7 @@ def test_an_interrupted_run_of_newer_input_leaves_old_results_out_of_date(root):
     assert out_of_date(run.folder) == [PRESSURE]
 
 
+@pytest.mark.thorough
 def test_it_is_shared_only_with_a_flag(root, capsys):
     pressure(root)
     assert rodsight("share", root / "runs" / "tracked") == 2

@@ -125,6 +125,7 @@ def test_an_open_boundary_is_reported_with_its_place_and_cure(tmp_path):
     assert all('[boundary] grains = "outer"' in each for each in warnings)
 
 
+@pytest.mark.thorough
 def test_a_free_surface_of_a_heap_is_not_reported(tmp_path):
     gravity = "\n[material]\ngravity = [0.0, -9.81]"
     folder = write(tmp_path, heap(), f'[walls]\nfile = "walls.csv"{gravity}', walls=floor(-0.3, 0.3, -R))
@@ -133,6 +134,7 @@ def test_a_free_surface_of_a_heap_is_not_reported(tmp_path):
     assert free_surfaces(*bound(folder))
 
 
+@pytest.mark.thorough
 def test_outermost_grains_as_boundary_close_the_packing(tmp_path):
     assert free_surfaces(*bound(write(tmp_path, hexagonal(0.05, 0.16), '[boundary]\ngrains = "outer"'))) == []
 

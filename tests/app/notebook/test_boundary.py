@@ -34,6 +34,7 @@ def lattice() -> tuple[pd.DataFrame, pd.DataFrame]:
     return tracks, pd.DataFrame(vectors, columns=["frame", "ax", "ay", "bx", "by"])
 
 
+@pytest.mark.thorough
 def test_forces_of_a_periodic_packing_are_in_equilibrium_across_its_edges(lattice):
     tracks, cell = lattice
     run = rodsight.solve(tracks, boundary=cell, settings={"recording.sweeps": "none"})

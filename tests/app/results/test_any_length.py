@@ -27,6 +27,7 @@ from tests.app.results.full_results import make_full_results
 ORIGIN = Provenance("print", "experiment.toml", (0, None), {})
 
 
+@pytest.mark.thorough
 def test_frames_of_a_checkpoint_are_stored_as_those_in_memory(tmp_path):
     full = make_full_results()
     checkpoint = Checkpoint(tmp_path / "solving", "fingerprint")
@@ -150,6 +151,7 @@ def test_a_cached_sequence_keeps_the_most_recent_items_within_its_capacity():
         some[7]
 
 
+@pytest.mark.thorough
 def test_an_open_file_holds_one_block_of_a_dataset_at_most(tmp_path):
     save_results(tmp_path / "results.h5", make_full_results(), ORIGIN)
     results = load_results(tmp_path / "results.h5")

@@ -143,6 +143,7 @@ def test_the_report_names_grains_with_a_new_reference(rods: Rods, photographs: P
     assert "second best ZNCC 0.4321" in page
 
 
+@pytest.mark.thorough
 def test_a_stain_that_stays_in_place_is_no_damage(rods: Rods, tmp_path: Path) -> None:
     for frame in range(FRAMES):
         image = photograph(rods, frame, DAMAGED[:0])

@@ -23,6 +23,7 @@ LENS = OpenCVLens(fx=900.0, fy=900.0, cx=260.0, cy=300.0, k1=-0.12, k2=0.03, p1=
 LENS_TABLE = "lens = { fx = 900, cx = 260, cy = 300, k1 = -0.12, k2 = 0.03, p1 = 4e-4, p2 = -3e-4 }\n"
 
 
+@pytest.mark.thorough
 def test_walls_of_the_first_photograph_suffice(followed: Tracked) -> None:
     assert np.abs(wall_errors(followed.walls.endpoints, followed.true_walls)).max() < WALL_ALLOWED
     table = read_table(followed.out / "tracked_walls.csv", ("frame", "wall", "x1", "y1", "x2", "y2", "sigma1"))

@@ -206,6 +206,7 @@ def test_reviewers_are_compared_with_each_other_and_with_the_detector(solved):
     assert pair["verdicts"] == {"anna": "contact", "ben": "no contact"}
 
 
+@pytest.mark.thorough
 def test_a_run_of_some_photographs_is_shown_over_those(solved):
     visitor, at, results, _ = solved
     answer = visitor.request("network", at=at, frame=FIRST)
@@ -247,6 +248,7 @@ def test_accounts_of_machines_name_no_reviewer(visitor, monkeypatch):
         assert visitor.request("reviewer")["name"] == name
 
 
+@pytest.mark.thorough
 def test_a_run_that_removes_its_pieces_meanwhile_is_no_error(solved, monkeypatch):
     visitor, at, results, folder = solved
     pieces = folder / UNFINISHED / "solving"
@@ -342,6 +344,7 @@ def test_the_folder_that_is_opened_is_duplicated_below_itself(visitor, photograp
     assert not (folder / second["at"] / first["at"]).exists()
 
 
+@pytest.mark.thorough
 def test_the_motion_of_rods_is_that_of_their_tracks(solved):
     visitor, at, results, _ = solved
     tracks, last = results.tracks, FIRST + len(results.frames) - 1
@@ -393,6 +396,7 @@ def test_fringes_are_values_of_the_discs_where_the_run_has_them(solved):
         np.testing.assert_allclose(np.array(answer[name], float), values[-1, here] / found.mean, rtol=2e-3, atol=1e-4)
 
 
+@pytest.mark.thorough
 def test_candidate_pairs_are_those_of_their_photograph(solved):
     visitor, at, results, _ = solved
     for frame in range(len(results.frames)):

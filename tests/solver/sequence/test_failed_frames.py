@@ -56,7 +56,10 @@ def assert_only_the_bad_one_failed(frames, sound):
         assert frame.unbalance < max(1.5 * usual.unbalance, CHAIN_UNBALANCED)  # a chain starts from zero
 
 
-@pytest.mark.parametrize("settings", [SETTINGS, ENSEMBLE], ids=["nlgs", "ensemble"])
+@pytest.mark.parametrize(
+    "settings",
+    [pytest.param(SETTINGS, id="nlgs"), pytest.param(ENSEMBLE, id="ensemble", marks=pytest.mark.thorough)],
+)
 @pytest.mark.parametrize("spoil", [blank, without_walls, infinite])
 def test_an_unusable_frame_fails_alone(settings, spoil):
     frames = [frame for frame, _ in solve_with_fault(settings, spoil)]

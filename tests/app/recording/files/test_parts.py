@@ -53,6 +53,7 @@ def test_all_parts_together_equal_the_recording(whole, split):
     assert [each.name for each in parts_of(split)] == [part_of(split, 1 + k).name for k in range(3)]
 
 
+@pytest.mark.thorough
 def test_every_part_opens_alone(whole, split):
     paths = set(RrdReader(str(whole)).store().schema().entity_paths())
     for number, part in enumerate(parts_of(split)):

@@ -59,6 +59,7 @@ def first(laboratory: Laboratory, rods: Rods, tmp_path_factory: pytest.TempPathF
     return photographed(tmp_path_factory.mktemp("brown"), laboratory, rods, 0.0, 0.0, np.zeros(rods.count), 1)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("known", [True, False])
 def test_brown_rods_are_all_found(first: np.ndarray, rods: Rods, known: bool) -> None:
     settings = DetectionSettings(radii=CLASSES) if known else DetectionSettings(radius_range=(11.0, 36.0))

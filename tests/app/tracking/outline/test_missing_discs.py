@@ -77,6 +77,22 @@ def test_a_rim_must_be_nearly_as_strong_as_those_of_its_size(faint: float, added
     assert add_missing_discs(image, given).count == given.count + added
 
 
+@pytest.mark.parametrize(("faint", "added"), [(0.95, 1), (0.25, 0)])
+def test_a_weak_ring_is_no_disc_however_complete_its_edge(
+    faint: float, added: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    image, given = with_a_hole(faint)
+    measure = RimImage.measure
+
+    def complete(self: RimImage, *given: np.ndarray) -> np.ndarray:
+        found = np.nan_to_num(measure(self, *given), nan=0.1)
+        found[:, [QUALITY, VIEW]] = 1.0
+        return found
+
+    monkeypatch.setattr(RimImage, "measure", complete)
+    assert add_missing_discs(image, given).count == given.count + added
+
+
 @pytest.mark.parametrize("column", [QUALITY, VIEW])
 def test_a_disc_needs_an_edge_and_a_view_of_its_rim(column: int, monkeypatch: pytest.MonkeyPatch) -> None:
     image, given = with_a_hole(0.95)
@@ -91,6 +107,7 @@ def test_a_disc_needs_an_edge_and_a_view_of_its_rim(column: int, monkeypatch: py
     assert add_missing_discs(image, given).count == given.count
 
 
+@pytest.mark.thorough
 def test_nothing_is_added_to_painted_rods_or_on_painted_bars() -> None:
     image = read_photograph(SAMPLE / "photos" / "0000.jpg")
     table = read_table(SAMPLE / "grains.csv", ("x", "y", "radius"))
