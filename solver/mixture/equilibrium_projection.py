@@ -2,6 +2,9 @@
 
 Grains whose contacts are missing from the list, for instance where fringes were too faint, are held by no force. Strict
 equilibrium then removes all forces around them. The standard deviations of the field limit how much it may change.
+
+The mean of several fields is out of equilibrium by their errors, and the nearest field in equilibrium is smaller: on
+six packings in the apparatus of corner discs by 2 % on average, all of it along walls without a load.
 """
 
 from __future__ import annotations
@@ -18,9 +21,14 @@ from ..convex.program import Balance, ConvexForces, ConvexSettings, project_onto
 # equilibrium then spoils a good field; relaxed equilibrium may change it by less.
 MAX_CHANGE, MAX_CHANGE_RELAXED = 0.45, 0.15
 RELAXATION = (0.1, 0.03, 0.01, 0.003, 0.001)  # factors on the price of a force residual, tried in this order
+KEPT_TOTAL = 1e-3  # relative change of a sum of forces that is let pass
+RAISED = 3.0  # the second field that is projected is this often as much larger as the sum of the first is too small
+MAX_RAISED = 0.3  # … but by no more than this fraction
 
 
-def project_mixed_field(balance: Balance, fn: Array, ft: Array, fn_sd: Array, settings: ConvexSettings) -> ConvexForces:
+def project_mixed_field(
+    balance: Balance, fn: Array, ft: Array, fn_sd: Array, settings: ConvexSettings, total: float | None = None
+) -> ConvexForces:
     """Find the field in equilibrium that is nearest to a given one; relax equilibrium where it contradicts the field.
 
     Parameters
@@ -33,21 +41,53 @@ def project_mixed_field(balance: Balance, fn: Array, ft: Array, fn_sd: Array, se
         Standard deviations of f_n [N].
     settings : ConvexSettings
         Settings of the convex program; `balance` is the price of a force residual.
+    total : float, optional
+        Sum of f_n [N] that the field in equilibrium shall have; None: any.
 
     Notes
     -----
     The strict projection is accepted if rms(Δf_n) ≤ 0.45 rms(fn_sd). Otherwise the price is multiplied by 0.1, 0.03,
     0.01, 0.003 or 0.001, the first for which rms(Δf_n) ≤ 0.15 rms(fn_sd), else the last.
+
+    Where the sum of the accepted f_n differs from the total S, a multiple of the given field is projected, too, and
+
+        f = f_1 + θ (f_2 − f_1),  θ = (S − S_1)/(S_2 − S_1),  0 ≤ θ ≤ 1,
+
+    is in equilibrium and inside the Coulomb cones as both are. θ = 1 at most: loads may leave no other sum.
     """
+    found, price = _project_within(balance, fn, ft, fn_sd, settings)
+    if total is None or not found.converged:
+        return found
+    reached = float(found.fn.sum())
+    if not reached > 0.0 or abs(total - reached) <= KEPT_TOTAL * reached:
+        return found
+    raised = 1.0 + float(np.clip(RAISED * (total / reached - 1.0), -MAX_RAISED, MAX_RAISED))
+    other = project_onto_equilibrium(balance, raised * fn, raised * ft, replace(settings, balance=price))
+    change = float(other.fn.sum()) - reached
+    if not (other.converged and change * (total - reached) > 0.0):
+        return found
+    share = min((total - reached) / change, 1.0)
+    return replace(
+        found, fn=found.fn + share * (other.fn - found.fn), ft=found.ft + share * (other.ft - found.ft),
+        iterations=found.iterations + other.iterations,
+    )  # fmt: skip
+
+
+def _project_within(
+    balance: Balance, fn: Array, ft: Array, fn_sd: Array, settings: ConvexSettings
+) -> tuple[ConvexForces, float]:
+    """Project with the least relaxation that keeps the change within the standard deviations; return the price, too."""
     sd = float(np.sqrt(np.mean(fn_sd**2))) if len(fn_sd) else 0.0
     found = project_onto_equilibrium(balance, fn, ft, settings)
     if found.converged and _rms_change(found.fn, fn) <= MAX_CHANGE * sd:
-        return found
+        return found, settings.balance
+    price = settings.balance
     for factor in RELAXATION:
-        found = project_onto_equilibrium(balance, fn, ft, replace(settings, balance=factor * settings.balance))
+        price = factor * settings.balance
+        found = project_onto_equilibrium(balance, fn, ft, replace(settings, balance=price))
         if found.converged and _rms_change(found.fn, fn) <= MAX_CHANGE_RELAXED * sd:
             break
-    return found
+    return found, price
 
 
 def _rms_change(found: Array, given: Array) -> float:

@@ -64,6 +64,7 @@ def mix_on_contacts(
     scale_known: bool,
     softness: Softness | None = None,
     position_weight: float | None = None,
+    stress_factor: Array | None = None,
 ) -> Mixture:
     """Mix the motion estimate with the position-only estimate on the contacts of the motion estimate.
 
@@ -83,6 +84,8 @@ def mix_on_contacts(
         None: grains are hard.
     position_weight : float, optional
         Weight of the position-only estimate; None: from the trusts of both.
+    stress_factor : array (p,), optional
+        Of the p forces of the position-only estimate, see `stress_matching`; None: 1.
 
     Raises
     ------
@@ -91,8 +94,8 @@ def mix_on_contacts(
 
     Notes
     -----
-    With u the position weight of `mix_fields` and q the ratio of both sums of f_n (motion over positions), the variance
-    of a force is that of a mixture of two distributions:
+    With u the position weight of `mix_fields` and q the ratio of both sums of f_n (motion over positions, those after
+    the stress factors), the variance of a force is that of a mixture of two distributions:
 
         sd² = (1 − u) sd_m² + u (q sd_p)² + u (1 − u) (f_m − q f_p)².
 
@@ -102,9 +105,10 @@ def mix_on_contacts(
     weight = 1.0 if softness is None else 0.0 if np.isnan(motion_trust) else softness.motion_weight
     expected = expected_of_motion(motion_trust, scale_known=scale_known)
     field = ForceField(contacts.key, np.column_stack([motion.fn, motion.ft]), motion_trust, expected)
-    found = mix_fields(field, positions, weight, position_weight)
-    other = _match_to(contacts, positions)
-    factor = float(motion.fn.sum() / positions.fn.sum())
+    stress_factor = np.ones_like(positions.fn) if stress_factor is None else stress_factor
+    found = mix_fields(field, positions, weight, position_weight, stress_factor)
+    other = _match_to(contacts, positions, stress_factor)
+    factor = float(motion.fn.sum() / (stress_factor * positions.fn).sum())
     force, trust = match_values(contacts.key, found.key, found.force, fill=0.0), found.trust
     if softness is not None:
         trust = soft_mixture_trust(trust, positions.trust, softness.trust, weight)
@@ -199,8 +203,8 @@ def offered_pairs(positions: FramePosterior) -> Contacts:
     return positions.contacts.select(positions.bearing_probability > MIN_OFFERED_PROBABILITY)
 
 
-def _match_to(contacts: Contacts, positions: FramePosterior) -> ForceEstimate:
-    columns = positions.fn, positions.ft, positions.fn_sd, positions.ft_sd
+def _match_to(contacts: Contacts, positions: FramePosterior, factor: Array) -> ForceEstimate:
+    columns = (factor * each for each in (positions.fn, positions.ft, positions.fn_sd, positions.ft_sd))
     return ForceEstimate(*(match_values(contacts.key, positions.contacts.key, each, fill=0.0) for each in columns))
 
 

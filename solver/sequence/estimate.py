@@ -31,6 +31,7 @@ from ..mixture.frame_mixture import (
     motion_weight,
     overlap_scale,
 )
+from ..mixture.stress_matching import stress_factors
 from ..nlgs.chain import ChainStep, advance_chain
 from ..nlgs.force_memory import ForceMemory
 from ..posterior.frame_posterior import FramePosterior
@@ -233,13 +234,20 @@ def _mix(
         seen = problem.settings.measured_overlap
         weight = motion_weight(positions.overlap, motion_scale(problem.motion, problem.snapshot.sigma)) if seen else 0.0
         softness = Softness(problem.settings.soft_trust, weight)
+    known, total, factor = problem.packing.scale_is_known, None, None
+    if known and softness is None and not np.isnan(reliability):  # the stress follows from sliding, not from positions
+        total = float(estimate.fn.sum())
+        if not any(problem.packing.material.gravity):  # nor is it uniform under weight
+            position = problem.snapshot.position
+            stress = love_weber_stress(contacts, estimate.fn, estimate.ft, position, 1.0, 1.0)
+            factor = stress_factors(positions.contacts, positions.fn, positions.ft, position, stress)
     mixture = mix_on_contacts(
-        contacts, field, positions, reliability, scale_known=problem.packing.scale_is_known, softness=softness,
-        position_weight=position_weight,
+        contacts, field, positions, reliability, scale_known=known, softness=softness,
+        position_weight=position_weight, stress_factor=factor,
     )  # fmt: skip
     assert estimate.balance is not None
     convex = problem.settings.ensemble.convex
-    projected = project_mixed_field(estimate.balance, mixture.fn, mixture.ft, mixture.fn_sd, convex)
+    projected = project_mixed_field(estimate.balance, mixture.fn, mixture.ft, mixture.fn_sd, convex, total)
     fn, ft = (projected.fn, projected.ft) if projected.converged else (mixture.fn, mixture.ft)
     members = estimate.members
     if not problem.motion.ends_here:  # no member has a history of its own yet

@@ -104,3 +104,40 @@ def test_without_contacts_the_projection_is_empty():
     empty = np.empty(0)
     nothing = balance.__class__(balance.matrix[:, :0], balance.load, empty, UNIT, balance.grains)
     assert len(project_mixed_field(nothing, empty, empty, empty, ConvexSettings()).fn) == 0
+
+
+def residual(balance, found):
+    force = np.concatenate([found.fn, found.ft]) / UNIT
+    return np.abs(balance.matrix @ force - balance.load).max()
+
+
+@pytest.mark.parametrize("factor", [0.995, 1.005])
+def test_field_in_equilibrium_has_the_given_sum_of_forces(factor, monkeypatch):
+    fn, ft, balance = lattice()
+    noisy = fn * (1 + 0.6 * np.random.default_rng(5).normal(size=len(fn)))
+    fn_sd = 10.0 * fn  # equilibrium is strict
+    nearest = project_mixed_field(balance, noisy, ft, fn_sd, ConvexSettings())
+    total = factor * nearest.fn.sum()
+    monkeypatch.setattr(
+        equilibrium_projection, "RAISED", 60.0
+    )  # one plate and two side walls leave the sum little room
+    found = project_mixed_field(balance, noisy, ft, fn_sd, ConvexSettings(), total)
+    assert found.fn.sum() == pytest.approx(total, rel=1e-9)
+    assert residual(balance, found) < 2.0 * residual(balance, nearest)
+    assert np.all(np.abs(found.ft) <= 0.25 * found.fn + 1e-9)
+
+
+def test_sum_that_the_loads_forbid_is_approached_but_no_load_is_violated():
+    fn, ft, balance = lattice()
+    fn_sd = 10.0 * fn
+    nearest = project_mixed_field(balance, fn, ft, fn_sd, ConvexSettings())
+    found = project_mixed_field(balance, fn, ft, fn_sd, ConvexSettings(), 3.0 * nearest.fn.sum())
+    assert nearest.fn.sum() < found.fn.sum() < 1.5 * nearest.fn.sum()
+    assert residual(balance, found) < 0.01
+
+
+def test_sum_that_is_reached_needs_no_second_projection():
+    fn, ft, balance = lattice()
+    nearest = project_mixed_field(balance, fn, ft, 10.0 * fn, ConvexSettings())
+    found = project_mixed_field(balance, fn, ft, 10.0 * fn, ConvexSettings(), 1.0005 * nearest.fn.sum())
+    np.testing.assert_array_equal(found.fn, nearest.fn)
