@@ -46,11 +46,7 @@ class MixedField:
 
 
 def mix_fields(
-    motion: ForceField,
-    posterior: FramePosterior,
-    weight: float = 1.0,
-    given: float | None = None,
-    factor: Float[Array, " p"] | float = 1.0,
+    motion: ForceField, posterior: FramePosterior, weight: float = 1.0, given: float | None = None
 ) -> MixedField:
     """Mix a motion estimate with a posterior of the same frame.
 
@@ -59,14 +55,11 @@ def mix_fields(
     motion : ForceField
         Motion estimate.
     posterior : FramePosterior
-        Position-only estimate.
+        Position-only estimate. The agreement is that without its stress factors, because they follow from the motion.
     weight : float
         Weight of motion, 1 for hard grains, less for soft ones, whose overlap hides their sliding.
     given : float, optional
         Position weight u; None: from the trusts of both.
-    factor : array (p,) or float
-        Of the posterior's forces, p in number, in the mixture. The agreement of both is that without it, because it
-        may follow from the motion.
 
     Raises
     ------
@@ -75,10 +68,10 @@ def mix_fields(
 
     Notes
     -----
-    With m and p both fields over their sums of f_n, S_m the sum of the motion's, q the factors over their mean that the
-    forces weigh and u the position weight,
+    With m and p both fields over their sums of f_n, the positions' after the stress factors, S_m the sum of the
+    motion's and u the position weight,
 
-        f = S_m ((1 − u) m + u q p),
+        f = S_m ((1 − u) m + u p),
         trust = ((1 − u) s_m T_m + u s_p T_c)/√((1 − u)² s_m² + u² s_p² + 2 u (1 − u) s_m s_p c),
 
     where s_m, s_p are the standard deviations of m and p over the pairs, c their correlation, T_m and T_p from
@@ -86,8 +79,8 @@ def mix_fields(
     `compute_position_weight` with the motion's expected correlation. The sum is the motion's: the stress along walls
     without a load follows from sliding, which positions do not show.
     """
-    factors = np.broadcast_to(np.asarray(factor), posterior.fn.shape)
-    geometry = np.column_stack([posterior.fn, posterior.ft, factors * posterior.fn, factors * posterior.ft])
+    factor = np.ones_like(posterior.fn) if posterior.stress_factor is None else posterior.stress_factor
+    geometry = np.column_stack([posterior.fn, posterior.ft, factor * posterior.fn, factor * posterior.ft])
     totals = float(motion.force[:, 0].sum()), float(posterior.fn.sum())
     if not min(totals) > 0.0:
         raise ValueError("a field without forces cannot be mixed")

@@ -64,7 +64,6 @@ def mix_on_contacts(
     scale_known: bool,
     softness: Softness | None = None,
     position_weight: float | None = None,
-    stress_factor: Array | None = None,
 ) -> Mixture:
     """Mix the motion estimate with the position-only estimate on the contacts of the motion estimate.
 
@@ -84,8 +83,6 @@ def mix_on_contacts(
         None: grains are hard.
     position_weight : float, optional
         Weight of the position-only estimate; None: from the trusts of both.
-    stress_factor : array (p,), optional
-        Of the p forces of the position-only estimate, see `stress_matching`; None: 1.
 
     Raises
     ------
@@ -105,10 +102,10 @@ def mix_on_contacts(
     weight = 1.0 if softness is None else 0.0 if np.isnan(motion_trust) else softness.motion_weight
     expected = expected_of_motion(motion_trust, scale_known=scale_known)
     field = ForceField(contacts.key, np.column_stack([motion.fn, motion.ft]), motion_trust, expected)
-    stress_factor = np.ones_like(positions.fn) if stress_factor is None else stress_factor
-    found = mix_fields(field, positions, weight, position_weight, stress_factor)
-    other = _match_to(contacts, positions, stress_factor)
-    factor = float(motion.fn.sum() / (stress_factor * positions.fn).sum())
+    found = mix_fields(field, positions, weight, position_weight)
+    placed = _after_stress_factors(positions)
+    other = ForceEstimate(*(match_values(contacts.key, positions.contacts.key, each, fill=0.0) for each in placed))
+    factor = float(motion.fn.sum() / placed[0].sum())
     force, trust = match_values(contacts.key, found.key, found.force, fill=0.0), found.trust
     if softness is not None:
         trust = soft_mixture_trust(trust, positions.trust, softness.trust, weight)
@@ -203,9 +200,11 @@ def offered_pairs(positions: FramePosterior) -> Contacts:
     return positions.contacts.select(positions.bearing_probability > MIN_OFFERED_PROBABILITY)
 
 
-def _match_to(contacts: Contacts, positions: FramePosterior, factor: Array) -> ForceEstimate:
-    columns = (factor * each for each in (positions.fn, positions.ft, positions.fn_sd, positions.ft_sd))
-    return ForceEstimate(*(match_values(contacts.key, positions.contacts.key, each, fill=0.0) for each in columns))
+def _after_stress_factors(positions: FramePosterior) -> tuple[Array, ...]:
+    """Forces (p,) of the position-only estimate and their standard deviations, times the stress factors."""
+    columns = positions.fn, positions.ft, positions.fn_sd, positions.ft_sd
+    factor = positions.stress_factor
+    return columns if factor is None else tuple(factor * each for each in columns)
 
 
 def _mixture_sd(weight: float, one: Array, two: Array, one_sd: Array, two_sd: Array) -> Array:

@@ -59,6 +59,7 @@ class FramePosterior:
     pressure: Float[Array, " n"]  # [N] sum of the normal forces on a grain
     pressure_sd: Float[Array, " n"]  # [N] over the draws
     fringes: FringeEvidence | None = None  # None: no photoelastic photographs
+    stress_factor: Float[Array, " c"] | None = None  # of the forces in a mixture, see `stress_matching`; None: 1
 
 
 def infer_frame(

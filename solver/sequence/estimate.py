@@ -234,16 +234,17 @@ def _mix(
         seen = problem.settings.measured_overlap
         weight = motion_weight(positions.overlap, motion_scale(problem.motion, problem.snapshot.sigma)) if seen else 0.0
         softness = Softness(problem.settings.soft_trust, weight)
-    known, total, factor = problem.packing.scale_is_known, None, None
+    known, total = problem.packing.scale_is_known, None
     if known and softness is None and not np.isnan(reliability):  # the stress follows from sliding, not from positions
         total = float(estimate.fn.sum())
         if not any(problem.packing.material.gravity):  # nor is it uniform under weight
             position = problem.snapshot.position
             stress = love_weber_stress(contacts, estimate.fn, estimate.ft, position, 1.0, 1.0)
             factor = stress_factors(positions.contacts, positions.fn, positions.ft, position, stress)
+            positions = replace(positions, stress_factor=factor)
     mixture = mix_on_contacts(
         contacts, field, positions, reliability, scale_known=known, softness=softness,
-        position_weight=position_weight, stress_factor=factor,
+        position_weight=position_weight,
     )  # fmt: skip
     assert estimate.balance is not None
     convex = problem.settings.ensemble.convex

@@ -11,7 +11,7 @@ MUTANTS = [
         ("force, factor = force / factor, 1.0", "force, factor = force, factor"),
         ("own + weight * (1.0 - weight) * (one - two) ** 2", "own"),
         ("force * factor ** (weight - 1.0)", "force * factor**weight"),
-        ("motion.fn.sum() / (stress_factor * positions.fn).sum()", "positions.fn.sum() / motion.fn.sum()"),
+        ("motion.fn.sum() / placed[0].sum()", "placed[0].sum() / motion.fn.sum()"),
         ("0.0 if np.isnan(motion_trust) else softness.motion_weight", "softness.motion_weight"),
         ("(overlap / (HALF_WEIGHT_OVERLAP * moved)) ** 2", "overlap / (HALF_WEIGHT_OVERLAP * moved)"),
         ("_mixture_sd(u, motion.ft, factor * other.ft,", "_mixture_sd(u, motion.ft, other.ft,"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rodsight.solver.contacts.contacts import Contacts
@@ -72,6 +74,6 @@ def test_factors_change_the_mixture_but_not_the_agreement() -> None:
     )  # fmt: skip
     motion = ForceField(contacts.key, np.column_stack([factor * fn, 0.0 * fn]), 0.9)
     plain = mix_fields(motion, posterior, given=1.0)
-    found = mix_fields(motion, posterior, given=1.0, factor=factor)
+    found = mix_fields(motion, replace(posterior, stress_factor=factor), given=1.0)
     np.testing.assert_allclose(found.force[:, 0], factor * fn)
     assert found.agreement == plain.agreement < 1.0
