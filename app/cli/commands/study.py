@@ -17,7 +17,7 @@ from ..terminal import print_line, progress_of, table_console
 from .run import Request, open_run
 
 # Of the simulated apparatus on which --program compares.
-APPARATUS_GRAINS, APPARATUS_FRAMES, APPARATUS_RADIUS_ERROR = 300, 30, -0.02
+APPARATUS_GRAINS, APPARATUS_FRAMES, APPARATUS_RADIUS_ERROR = 300, 60, -0.02
 
 if TYPE_CHECKING:
     from ...study.scenarios.scenario_score import StudyPlan
