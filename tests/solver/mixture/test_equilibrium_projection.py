@@ -141,3 +141,12 @@ def test_sum_that_is_reached_needs_no_second_projection():
     nearest = project_mixed_field(balance, fn, ft, 10.0 * fn, ConvexSettings())
     found = project_mixed_field(balance, fn, ft, 10.0 * fn, ConvexSettings(), 1.0005 * nearest.fn.sum())
     np.testing.assert_array_equal(found.fn, nearest.fn)
+
+
+def test_sum_that_moves_away_is_not_extrapolated(monkeypatch):
+    fn, ft, balance = lattice()
+    noisy = fn * (1 + 0.6 * np.random.default_rng(5).normal(size=len(fn)))
+    nearest = project_mixed_field(balance, noisy, ft, 10.0 * fn, ConvexSettings())
+    monkeypatch.setattr(equilibrium_projection, "RAISED", -3.0)  # the second field is smaller where the sum must grow
+    found = project_mixed_field(balance, noisy, ft, 10.0 * fn, ConvexSettings(), 1.02 * nearest.fn.sum())
+    np.testing.assert_array_equal(found.fn, nearest.fn)
