@@ -102,9 +102,8 @@ def _places_of(names: list[str]) -> list[Array]:
         rows[-1].append(width)
     places = []
     for k, widths in enumerate(rows):
-        space = (KEY_WIDTH - sum(widths)) / max(len(widths), 1)  # shared by the names of a row
-        ends = np.cumsum(np.array(widths) + space)
-        middles = ends - 0.5 * (np.array(widths) + space)
+        wide = np.array(widths) + (KEY_WIDTH - sum(widths)) / max(len(widths), 1)  # names of a row share the space
+        middles = np.cumsum(wide) - 0.5 * wide
         places += [np.array([middle, 12.0 + 24.0 * k]) for middle in middles]
     return places
 
