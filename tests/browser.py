@@ -88,8 +88,13 @@ def open_when_served(page: Page, address: str) -> None:
 
 def wait_for_forces(page: Page) -> None:
     """Wait until a page with the force network in front shows forces, and not their legend alone."""
-    page.wait_for_function(f"() => seen.warm(0, {LEGEND_FROM}) > {DRAWN}", polling=POLLING)
-    assert forces_drawn(picture_of(page))
+    until = time.monotonic() + SECONDS
+    while True:
+        page.wait_for_function(f"() => seen.warm(0, {LEGEND_FROM}) > {DRAWN}", polling=POLLING)
+        if forces_drawn(picture_of(page)):
+            return
+        # The viewer draws while data come, so that a picture may be taken between two of its own that show forces.
+        assert time.monotonic() < until, "the canvas has forces, the page's picture has none"
 
 
 def wait_for_colour(page: Page, place: Array, colour: tuple[int, int, int], *, least: int, reach: int) -> None:

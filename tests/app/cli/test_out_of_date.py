@@ -53,6 +53,7 @@ CHANGES = {
 }
 
 
+@pytest.mark.thorough
 def test_a_finished_run_is_up_to_date_also_with_settings_of_the_command_line(root):
     assert out_of_date(root / "runs" / "tracked") == []
     assert json.loads((root / "runs" / "tracked" / "summary.json").read_text())["out_of_date"] == []

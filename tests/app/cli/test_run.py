@@ -43,6 +43,7 @@ def test_a_tracked_experiment_runs_to_results_recording_and_summary(tracked, tmp
     assert summary["status"][0] == "reset"
 
 
+@pytest.mark.thorough
 def test_the_results_file_has_the_public_layout(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("solve", str(tracked), "--out", str(out), *FEW) == 0
@@ -147,7 +148,7 @@ def test_photographs_are_tracked_and_solved(made_photographs, tmp_path, capsys):
     assert summary["accuracy"]["contact_recall"][3] == 1.0
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_range_of_frames_is_scored_against_its_own_truth(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("run", str(tracked), "--out", str(out), "--frames", "1:5", "--quiet") == 0
@@ -215,7 +216,7 @@ def test_every_command_has_help_with_an_example(command, capsys):
     assert f"Example: rodsight {command}" in " ".join(capsys.readouterr().out.split())
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_imposed_walls_alone_give_forces_up_to_a_scale(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     text = (tracked / "experiment.toml").read_text()
@@ -227,7 +228,7 @@ def test_imposed_walls_alone_give_forces_up_to_a_scale(tracked, tmp_path, capsys
     assert summary["accuracy"]["r_fn"][-1] > 0.7
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_recorded_wall_forces_are_compared_with_inferred_ones(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("solve", str(tracked), "--out", str(out)) == 0

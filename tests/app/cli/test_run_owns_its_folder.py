@@ -137,7 +137,7 @@ def test_a_damaged_piece_is_reported_and_computed_again(tracked, tmp_path, monke
     assert np.array_equal(forces(out), forces(tmp_path / "whole"))
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_damaged_results_are_not_read(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("solve", tracked, "--out", out, *FEW) == 0
@@ -217,7 +217,7 @@ def test_pieces_left_beside_complete_results_are_removed(tracked, tmp_path, monk
     assert not (tmp_path / "out" / ".unfinished").exists()
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_results_contain_no_names_of_persons_or_places(tracked, tmp_path, monkeypatch):
     monkeypatch.setattr(socket, "gethostname", lambda: "machine-of-somebody")
     home = Path(shutil.move(tracked, tmp_path / "of_somebody"))

@@ -26,7 +26,7 @@ def keep_every_second(folder):
         (folder / name).write_text("\n".join([head, *kept]) + "\n")
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_stride_solves_what_a_table_of_these_photographs_would(tracked, tmp_path, capsys):
     assert rodsight("solve", str(tracked), "--out", str(tmp_path / "stride"), "--frames", "::2", *FEW) == 0
     of_stride = load_results(tmp_path / "stride/results.h5")

@@ -75,7 +75,7 @@ def test_the_default_frame_is_the_last_settled_one(results):
     assert FrameStatus.SETTLED not in status[default_frame(results) + 1 :]
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_files_are_written_for_all_figures_with_data(results, tmp_path):
     files = write_figures(results, tmp_path / "figures", ("pdf", "svg"))
     assert {each.name for each in files} == {

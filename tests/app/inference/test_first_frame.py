@@ -26,6 +26,7 @@ def wrong_centres(tmp_path_factory: pytest.TempPathFactory) -> Solved:
     return solve(tmp_path_factory.mktemp("scenario"), "centres", 5, grains=RODS)
 
 
+@pytest.mark.thorough
 def test_later_frames_improve_the_first_and_its_reason_states_so(wrong_centres):
     results = wrong_centres.complete()
     before, after, true = wrong_centres.frames[0], results.frames[0], wrong_centres.true[0]

@@ -42,6 +42,7 @@ def contradicted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Inputs, Resu
     return inputs, infer_sequence(inputs)
 
 
+@pytest.mark.thorough
 def test_a_variation_without_effect_has_the_trust_of_the_run(contradicted):
     inputs, results = contradicted
     assert results.friction_check is not None
@@ -53,6 +54,7 @@ def test_a_variation_without_effect_has_the_trust_of_the_run(contradicted):
     assert effect.trust == pytest.approx(float(late.mean()), abs=0.005)
 
 
+@pytest.mark.thorough
 def test_the_friction_check_widens_the_intervals_of_every_frame(contradicted):
     inputs, results = contradicted
     unchecked = infer_sequence(inputs, complete=False)
@@ -69,6 +71,7 @@ def test_statistics_have_intervals_in_all_frames_to_which_a_motion_leads(contrad
     assert all(each.friction_angle_sd > 0.0 for each in results.statistics[1:])
 
 
+@pytest.mark.thorough
 def test_every_contact_states_the_coefficient_that_was_used(contradicted):
     inputs, _ = contradicted
     as_stated = replace(inputs.settings, resistance=False)  # the sliding contradicts it

@@ -23,7 +23,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Inputs:
     return read_inputs(load_experiment(folder, ()))
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 @pytest.mark.parametrize(("factor", "contradicted"), [(1.0, False), (0.3, True)])
 def test_a_precision_that_the_gaps_contradict_is_reported(inputs, factor, contradicted):
     stated = replace(inputs, tracks=replace(inputs.tracks, sigma=factor * inputs.tracks.sigma))

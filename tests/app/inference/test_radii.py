@@ -35,6 +35,7 @@ def lattice() -> tuple[Tracks, WallTracks]:
     return tracks, WallTracks(("bottom", "right", "top", "left"), ends, packing.pressure)
 
 
+@pytest.mark.thorough
 def test_exact_radii_are_only_calibrated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(radii, "estimate_radii", None)
     tracks, walls = lattice()
@@ -47,6 +48,7 @@ def test_exact_radii_are_only_calibrated(monkeypatch: pytest.MonkeyPatch) -> Non
     assert not calibration.applied
 
 
+@pytest.mark.thorough
 def test_estimated_radii_enter_the_tracks_and_the_calibration(monkeypatch: pytest.MonkeyPatch) -> None:
     exact, walls = lattice()
     error = np.random.default_rng(1).normal(0.0, 1e-4, exact.grain_count)

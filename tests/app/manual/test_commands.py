@@ -86,6 +86,8 @@ LATER = {
     "study worlds": "tests/app/study",
     "campaign": "tests/app/campaigns",
     "export figures": "tests/app/figures",
+    "export pictures": "tests/app/recording/viewing",
+    "export video": "tests/app/cli",
     "run my_test --ensemble": "tests/app/robustness",
     "run my_test --follow": "tests/app/following",
     "run try": "tests/app/cli",
@@ -94,7 +96,6 @@ LATER = {
 }
 MADE_BY = {"synth": 1, "init": 1, "import": 3}  # index of the word with the folder that a command creates
 COSTLY = ("export", "init", "run", "sensitivity", "share", "synth", "track")  # compute for seconds
-DRAWN = {("export", "pictures"), ("export", "video")}  # drawn by a viewer without a screen
 
 
 def page_commands() -> Iterator[tuple[str, ...]]:
@@ -123,13 +124,11 @@ def form(words: tuple[str, ...]) -> tuple[tuple[str, ...], set[str]]:
 def repeats(number: int) -> bool:
     """Whether another command of DONE has all options of this one, and more of them or an earlier place."""
     kind, options = form(DONE[number])
-    others = ((k, *form(words)) for k, words in enumerate(DONE) if words[0] in COSTLY and words[:2] not in DRAWN)
+    others = ((k, *form(words)) for k, words in enumerate(DONE) if words[0] in COSTLY)
     return any(other == kind and (options < more or (options == more and k < number)) for k, other, more in others)
 
 
 def marks(number: int) -> list[pytest.MarkDecorator]:
-    if DONE[number][:2] in DRAWN:
-        return [pytest.mark.screen]
     later = any(shlex.join(DONE[number]).startswith(start) for start in LATER)
     return [pytest.mark.slow] if later or repeats(number) else []
 

@@ -14,6 +14,7 @@ from rodsight.synthetic.synthesis import SynthesisSettings, synthesize
 
 from tests.program import ROOT
 
+FEWER_RUNS = "[0.15, 0.2, 0.25, 0.3, 0.4]", "[0.15, 0.25, 0.4]"  # of the parameter study: each is a process of its own
 SECONDS = 600  # for a cell, including the compilation of kernels
 
 NOTEBOOKS = sorted((FOLDER / "notebooks").glob("*.ipynb"))
@@ -36,6 +37,10 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def test_the_parameter_study_is_found_that_runs_with_fewer_values():
+    assert FEWER_RUNS[0] in (FOLDER / "notebooks/study_of_a_parameter.ipynb").read_text(encoding="utf-8")
+
+
 def test_there_are_four_without_outputs_and_the_page_names_them():
     nbformat = pytest.importorskip("nbformat", reason="needs the extra notebooks")
     page = (FOLDER / "python.md").read_text(encoding="utf-8")
@@ -54,7 +59,8 @@ def test_the_cells_of_a_notebook_run_on_a_small_experiment(file, small, monkeypa
     mpl.use("agg")
     shown: list[object] = []
     names = {"display": shown.append}
-    for number, cell in enumerate(json.loads(file.read_text(encoding="utf-8"))["cells"]):
+    text = file.read_text(encoding="utf-8")
+    for number, cell in enumerate(json.loads(text.replace(*FEWER_RUNS))["cells"]):
         if cell["cell_type"] == "code":
             exec(compile("".join(cell["source"]), f"{file.name}, cell {number}", "exec"), names)
     plt.close("all")

@@ -52,7 +52,7 @@ def test_public_names_exist_and_no_others():
         rodsight.solv  # noqa: B018
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_run_in_python_writes_the_same_files_as_the_command(made_tracks, run, tmp_path):
     assert command("run", str(made_tracks), "--out", str(tmp_path / "run"), "--quiet", "--set", "solver.sweeps=50") == 0
     assert run.file is not None

@@ -116,7 +116,7 @@ def test_colours_show_which_field_is_greater():
     assert less >> 24 < less >> 8 & 0xFF
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_command_compares_a_run_with_its_truth_and_with_itself(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     few = ("--set", "solver.sweeps=50", "--quiet")

@@ -54,7 +54,7 @@ def peak_of(work) -> int:
         gc.set_threshold(*usual)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_memory_is_independent_of_the_number_of_frames(tmp_path, monkeypatch):
     monkeypatch.setattr(writer, "BLOCK", 1 << 11)  # otherwise blocks fill after hundreds of frames
     monkeypatch.setattr(writer, "TEXTS", 8)

@@ -61,6 +61,7 @@ def thinned(results: Results, rng: np.random.Generator) -> Results:
     return replace(results, frames=frames)
 
 
+@pytest.mark.thorough
 @settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     seed=st.integers(0, 2**32 - 1),

@@ -99,6 +99,7 @@ def test_a_forbidden_contact_carries_no_force_and_an_added_one_exists(solved):
     assert (others.source == ContactSource.DETECTED).all()
 
 
+@pytest.mark.slow
 def test_undoing_every_verdict_gives_the_former_results(solved_by_default):
     out, again = solved_by_default
     before = load_results(out / "results.h5")
@@ -140,6 +141,7 @@ def test_ignoring_every_frame_is_refused(solved_by_default, capsys):
     assert "nothing is left to solve" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_spoiled_photograph_that_is_ignored_harms_no_other(tracked, tmp_path):
     out = tmp_path / "out"
     # The position-only estimate would repair a part of the harm.

@@ -60,7 +60,7 @@ def test_only_photographs_of_both_runs_are_compared(nominal):
     assert effect.r_fn > 0.7  # the last photograph, reached in steps twice as wide
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_lower_friction_lowers_the_macroscopic_friction_angle(nominal):
     low, high = (measure_case(nominal, Case((("friction", value),))) for value in (0.6, 1.4))
     assert low.friction_angle_change < 0.0

@@ -26,6 +26,7 @@ def truth(folder):
     return simulate(0, grains=GRAINS, folder=folder, reversal_angle=REVERSAL_ANGLE)
 
 
+@pytest.mark.thorough
 def test_a_truth_is_simulated_once_and_read_back_the_same(truth, folder, monkeypatch):
     def fail(*_args, **_kwargs):
         raise AssertionError("simulated again")

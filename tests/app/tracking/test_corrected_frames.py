@@ -42,6 +42,7 @@ def pop_all(seen: list[str]) -> list[str]:
     return now
 
 
+@pytest.mark.slow
 def test_only_frames_from_the_changed_correction_on_are_tracked_again(
     photographed: Path, tmp_path: Path, tracked_frames: list[str]
 ) -> None:

@@ -82,7 +82,7 @@ def run(photographed: Path, tmp_path: Path) -> pipeline.Run:
     return pipeline.Run(load_experiment(photographed, chosen), tmp_path / "run")
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_recording_uses_the_copies_that_tracking_stored(run, monkeypatch):
     results = pipeline.solve(run)
     cache = run.folder / ".tracked" / "pictures"

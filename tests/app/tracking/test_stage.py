@@ -30,6 +30,7 @@ def test_walls_of_the_first_photograph_suffice(followed: Tracked) -> None:
     assert len(table) == followed.true_walls.shape[0] * 4
 
 
+@pytest.mark.thorough
 def test_rows_of_later_frames_are_kept_when_walls_are_followed(partly_given: Tracked) -> None:
     walls, top = partly_given.walls, partly_given.walls.name.index("top")
     assert walls.endpoints[2, top] == pytest.approx(partly_given.true_walls[2, top])
@@ -150,6 +151,7 @@ def test_the_report_is_one_page_with_its_pictures_in_it(plain: Tracked) -> None:
         assert heading in page
 
 
+@pytest.mark.thorough
 def test_a_report_of_tables_is_refused(tracked: Path, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     assert "--report" in refuse(capsys, tmp_path / "out", "track", str(tracked), "--report")
 

@@ -219,7 +219,7 @@ def test_a_video_and_the_rods_of_another_program_make_an_experiment(tmp_path):
     assert len(read_grain_guess(made).id) == labels.max()
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_each_frame_of_a_time_lapse_is_a_photograph(tmp_path, capsys):
     labelled_discs(tmp_path)
     flags = ("--pixel-size", 1e-4, "--walls", "none", "--grains", tmp_path / "labels.png")

@@ -35,6 +35,7 @@ def test_load_of_the_ring_is_carried_by_three_rods_to_the_core() -> None:
     assert cell.ring == pytest.approx(RING - 2.0 * load / 3.0 / settings.normal_stiffness, abs=1e-7)
 
 
+@pytest.mark.thorough
 def test_rod_rolls_between_fixed_ring_and_rotating_core() -> None:
     cell = rods(0.0, squeezed=2e-5)
     cell.rest()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 import pytest
 from rodsight.solver.bodies.cell import Cell
@@ -136,6 +137,7 @@ def test_a_rotating_neighbourhood_has_its_rotation(lattice):
     np.testing.assert_allclose(motion.rotation, 0.2, atol=1e-12)
 
 
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="many seconds as plain Python")
 def test_maps_read_the_motion_over_a_window_that_noise_does_not_hide(lattice, rng):
     frames, noise = 17, 1e-5
     drift = rng.normal(0.0, 8e-6, lattice.shape)  # of a photograph: less than the noise

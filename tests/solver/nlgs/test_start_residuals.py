@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import numba
 import numpy as np
 import pytest
 from rodsight.solver.frame_forces import FrameForces
@@ -25,7 +26,13 @@ def test_cold_residuals_are_those_of_so_many_sweeps_from_zero() -> None:
     assert cold_residuals(problem) == pytest.approx(np.array(expected), rel=1e-9)
 
 
-@pytest.fixture(scope="module", params=[SETTINGS, ENSEMBLE], ids=["nlgs", "ensemble"])
+MANY_SECONDS = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="many seconds as plain Python")
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(SETTINGS, id="nlgs"), pytest.param(ENSEMBLE, id="ensemble", marks=MANY_SECONDS)],
+)
 def frames(request: pytest.FixtureRequest) -> list[FrameForces]:
     return [frame for frame, _ in solve_sequence(*sheared_frames(5), request.param)]
 

@@ -1,8 +1,10 @@
+import numba
 import numpy as np
 import pytest
 from rodsight.solver.posterior.touching_gaps import MIN_FRACTION, fit_touching
 
 REACH = 10.0
+MANY_SECONDS = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="many seconds as plain Python")
 
 
 def make_gaps(fraction: float, frames: int = 4, pairs: int = 1500, slope: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -24,6 +26,7 @@ def test_mean_sd_and_fraction_of_touching_gaps_are_found(fraction: float) -> Non
     np.testing.assert_allclose(found.touching_fraction, fraction, atol=0.06)
 
 
+@MANY_SECONDS
 def test_each_frame_has_its_own_touching_fraction() -> None:
     less, covariate = make_gaps(0.5, frames=10, slope=0.4)
     more, _ = make_gaps(0.8, frames=10, slope=0.4)
@@ -32,6 +35,7 @@ def test_each_frame_has_its_own_touching_fraction() -> None:
     assert found.slope[0] == pytest.approx(0.4, abs=0.04)
 
 
+@MANY_SECONDS
 def test_touching_fraction_has_a_lower_limit() -> None:
     gap, covariate = make_gaps(0.15)
     assert fit_touching(gap, covariate, REACH, narrow_sd=0.3).touching_fraction.min() == MIN_FRACTION

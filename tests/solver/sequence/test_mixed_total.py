@@ -14,6 +14,7 @@ from tests.solver.posterior.simulated import simulate_shear
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
 
 
+@pytest.mark.thorough
 def test_projected_mixture_keeps_the_sum_of_the_motion(monkeypatch: pytest.MonkeyPatch) -> None:
     sheared = simulate_shear(0.25, 6)
     mix, sums, used = estimates._mix, [], []

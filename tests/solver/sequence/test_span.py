@@ -44,6 +44,7 @@ def test_every_frame_reads_the_motion_of_so_many_photographs(monkeypatch):
     assert begins(monkeypatch) == pytest.approx([0, 1, 2, 3, 3, 3, 3, 3])
 
 
+@pytest.mark.thorough
 def test_a_frame_continues_the_forces_of_the_frame_where_its_motion_begins(monkeypatch):
     solved = solve(THREE)
     continued = {}
@@ -70,6 +71,7 @@ def test_what_is_counted_by_photographs_is_still_counted_so():
         assert state.time == 30.0 * spanned.frame
 
 
+@pytest.mark.thorough
 def test_motion_and_forces_from_before_a_reset_are_not_used(monkeypatch):
     assert begins(monkeypatch, verdicts={4: Verdicts(reset=True)}) == pytest.approx([0, 1, 2, 3, 3, 1, 2, 3])
     solved = solve(THREE, verdicts={4: Verdicts(reset=True)})
@@ -77,6 +79,7 @@ def test_motion_and_forces_from_before_a_reset_are_not_used(monkeypatch):
     assert [frame.frames_since_reset for frame, _ in solved] == [0, 1, 2, 3, 0, 1, 2, 3]
 
 
+@pytest.mark.thorough
 def test_motion_from_before_a_reversal_is_not_read(monkeypatch):
     _, sheared = sheared_frames(6)
     there_and_back = [replace(sheared[row], time=30.0 * k) for k, row in enumerate((0, 1, 2, 3, 4, 3, 2, 1))]
@@ -84,6 +87,7 @@ def test_motion_from_before_a_reversal_is_not_read(monkeypatch):
     assert read == pytest.approx([0, 1, 2, 3, 3, 1, 2, 3])
 
 
+@pytest.mark.thorough
 def test_a_frame_that_fails_costs_no_other(monkeypatch):
     solved = solve(THREE, failed={4: "dark"})
     assert [frame.status is FrameStatus.FAILED for frame, _ in solved] == [k == 4 for k in range(FRAMES)]

@@ -35,6 +35,7 @@ def test_the_viewers_own_check_accepts_the_file(recording):
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.thorough
 def test_the_same_run_recorded_twice_is_the_same(results, truth, tmp_path):
     paths = [tmp_path / "first.rrd", tmp_path / "second.rrd"]
     for path in paths:
@@ -58,6 +59,7 @@ def test_the_file_embeds_its_blueprint(recording):
     assert len(RrdReader(str(recording.path)).recordings()) == 1
 
 
+@pytest.mark.thorough
 def test_an_interrupted_recording_leaves_the_former_file_unchanged(results, tmp_path):
     path = tmp_path / "run.rrd"
     write_recording(results, path)
@@ -104,7 +106,7 @@ def test_a_recorder_that_was_not_started_raises(results):
         recorder.frame(results.frames[0], results.statistics[0])
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_size_limit_reduces_the_sweeps_and_adds_a_note(tmp_path):
     results = make_results(3, 10, 10, sweeps=400)
     full = write_recording(results, tmp_path / "full.rrd", options=RecordingOptions(sweeps="all"))

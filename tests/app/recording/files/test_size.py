@@ -26,7 +26,7 @@ def test_a_size_limit_is_kept_and_its_reductions_are_reported(tracked, tmp_path,
     assert "--max-size" in capsys.readouterr().err
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_every_sweep_of_chosen_frames_goes_to_a_side_file(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     common = ("record", str(tracked), "--out", str(out), "--sweeps", "all", *FEW)
