@@ -186,6 +186,7 @@ def send_requests(servers, count: int, seed: int, capture) -> list[str]:
     return problems
 
 
+@pytest.mark.thorough
 def test_some_hostile_requests_are_refused(servers, capsys):
     assert send_requests(servers, QUICK, SEED, capsys) == []
 

@@ -158,6 +158,7 @@ def sampled_state(case: Case, sweeps: int = 3) -> SamplerState:
     return state
 
 
+@pytest.mark.thorough
 def test_forces_bearing_and_gaps_have_the_plain_conditional_distributions(case):
     state, branches = case.start, []
     one, two = np.random.default_rng(1), np.random.default_rng(1)

@@ -44,6 +44,7 @@ def test_the_other_frames_stay_as_they_are(wrong_centres):
         np.testing.assert_array_equal(one.fn, other.fn)
 
 
+@pytest.mark.thorough
 def test_the_estimate_depends_on_the_other_frames_alone(wrong_centres):
     frames = wrong_centres.frames
     changed = [replace(frames[0], fn=0.0 * frames[0].fn), *frames[1:]]

@@ -64,6 +64,7 @@ def test_the_friction_check_widens_the_intervals_of_every_frame(contradicted):
         assert (after.fn_sd >= before.fn_sd).all()
 
 
+@pytest.mark.thorough
 def test_statistics_have_intervals_in_all_frames_to_which_a_motion_leads(contradicted):
     _, results = contradicted
     assert np.isfinite(results.frames[0].trust)

@@ -31,6 +31,7 @@ def run(made_tracks: Path, tmp_path_factory: pytest.TempPathFactory) -> rodsight
     return rodsight.run(made_tracks, out=tmp_path_factory.mktemp("verbs") / "run", settings=FEW)
 
 
+@pytest.mark.thorough
 def test_all_verbs_are_public_functions_that_stay_so_whatever_is_imported(run):
     assert set(rodsight.__all__) >= VERBS
     for name in VERBS:

@@ -53,6 +53,7 @@ def written(server):
     return file.read_text() if file.exists() else ""
 
 
+@pytest.mark.thorough
 def test_the_token_is_exchanged_for_a_strict_cookie(server):
     status, headers, _ = request(server, "GET", f"/?token={server.gate.token}")
     assert (status, headers["Location"]) == (303, "/#at=.&step=review")

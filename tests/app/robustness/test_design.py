@@ -39,6 +39,7 @@ def test_the_help_names_every_factor_and_its_range():
         assert found == {unit * abs(factor.low), unit * abs(factor.high)}, factor.name
 
 
+@pytest.mark.thorough
 def test_nominal_values_leave_the_inputs_unchanged(nominal):
     assert vary(nominal.inputs, Case(())) is nominal.inputs
     for factor in FACTORS:

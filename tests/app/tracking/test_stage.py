@@ -22,21 +22,20 @@ WALL_ALLOWED = 5e-6  # [m] along the normal
 LENS = OpenCVLens(fx=900.0, fy=900.0, cx=260.0, cy=300.0, k1=-0.12, k2=0.03, p1=4e-4, p2=-3e-4)
 LENS_TABLE = "lens = { fx = 900, cx = 260, cy = 300, k1 = -0.12, k2 = 0.03, p1 = 4e-4, p2 = -3e-4 }\n"
 
+pytestmark = pytest.mark.thorough
 
-@pytest.mark.thorough
+
 def test_walls_of_the_first_photograph_suffice(followed: Tracked) -> None:
     assert np.abs(wall_errors(followed.walls.endpoints, followed.true_walls)).max() < WALL_ALLOWED
     table = read_table(followed.out / "tracked_walls.csv", ("frame", "wall", "x1", "y1", "x2", "y2", "sigma1"))
     assert len(table) == followed.true_walls.shape[0] * 4
 
 
-@pytest.mark.thorough
 def test_rows_of_later_frames_are_kept_when_walls_are_followed(partly_given: Tracked) -> None:
     walls, top = partly_given.walls, partly_given.walls.name.index("top")
     assert walls.endpoints[2, top] == pytest.approx(partly_given.true_walls[2, top])
 
 
-@pytest.mark.thorough
 def test_a_wall_without_marks_is_named(photographed: Path, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     top = keep_first_walls(photographed)[0, 2]
     for file in (photographed / "photos").iterdir():
@@ -52,7 +51,6 @@ def test_a_wall_without_marks_is_named(photographed: Path, tmp_path: Path, capsy
     assert "patches of texture" in message
 
 
-@pytest.mark.thorough
 def test_detected_grains_can_be_edited_and_used(plain: Tracked, photographed: Path, tmp_path: Path) -> None:
     first = plain.tracks
     with (plain.out / "detections.csv").open(newline="") as stream:
@@ -73,7 +71,6 @@ def test_detected_grains_can_be_edited_and_used(plain: Tracked, photographed: Pa
     assert np.nanmax(np.abs(np.diff(again.position, axis=0) - np.diff(first.position[:, same], axis=0))) < 1e-5
 
 
-@pytest.mark.thorough
 def test_corrections_are_honoured(plain: Tracked, photographed: Path, tmp_path: Path) -> None:
     first = plain.tracks
     (photographed / "corrections.csv").write_text("frame,id,x,y,theta\n2,4,lost,,\n1,7,200.5,210.25,0.25\n")
@@ -151,7 +148,6 @@ def test_the_report_is_one_page_with_its_pictures_in_it(plain: Tracked) -> None:
         assert heading in page
 
 
-@pytest.mark.thorough
 def test_a_report_of_tables_is_refused(tracked: Path, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     assert "--report" in refuse(capsys, tmp_path / "out", "track", str(tracked), "--report")
 

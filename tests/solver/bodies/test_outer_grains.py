@@ -24,6 +24,7 @@ def outer_of(position: Array, walls: Walls = NO_WALLS):
     return find_outer_grains(np.full(len(position), R), position, np.ones(len(position), bool), walls)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("inner", [-1.0, 0.08])
 def test_outer_grains_are_those_with_missing_neighbours(inner: float) -> None:
     position = hexagonal(inner, 0.3)
@@ -47,6 +48,7 @@ def test_surfaces_of_holes_are_marked_and_point_inwards() -> None:
     assert np.all(away[~found.inner] > 0.0)
 
 
+@pytest.mark.thorough
 def test_grains_along_walls_are_not_outer() -> None:
     x, y = np.meshgrid(np.arange(8), np.arange(6))
     position = (
@@ -60,6 +62,7 @@ def test_grains_along_walls_are_not_outer() -> None:
     assert np.all(without_right.outward[:, 0] > 0.9)
 
 
+@pytest.mark.thorough
 def test_grains_along_circular_walls_are_not_outer() -> None:
     position = hexagonal(0.08, 0.3)
     distance = np.hypot(*position.T)

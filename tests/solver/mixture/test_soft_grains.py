@@ -25,6 +25,7 @@ def soft() -> SimulatedShear:
     return simulate_shear(0.25, 6, normal_stiffness=2e5)
 
 
+@pytest.mark.thorough
 def test_soft_grains_are_found_and_hard_ones_are_not(hard, soft) -> None:
     assert find_soft_overlap(hard.packing, hard.snapshots) == 0.0
     assert find_soft_overlap(soft.packing, soft.snapshots) > 1e-4

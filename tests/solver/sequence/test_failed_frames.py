@@ -117,6 +117,7 @@ def test_infinite_masses_fail_every_frame(settings):
     assert {frame.status for frame in frames} == {FrameStatus.FAILED}
 
 
+@pytest.mark.thorough
 def test_a_sequence_resumes_after_a_failed_frame_bit_for_bit():
     packing, snapshots = sheared_frames(COUNT)
     snapshots[BAD] = blank(snapshots[BAD])

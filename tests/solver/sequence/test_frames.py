@@ -55,6 +55,7 @@ def solved_heap(settings=SETTINGS, count=4):
     return run(*sheared_frames(count), settings)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("settings", [SETTINGS, ENSEMBLE], ids=["nlgs", "ensemble"])
 def test_a_sequence_resumes_from_a_stored_state_bit_for_bit(settings):
     packing, snapshots = sheared_frames(5)
@@ -228,6 +229,7 @@ def test_inertia_alone_has_no_correction_and_no_trust():
     assert np.isnan(frame.trust)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("settings", [SETTINGS, ENSEMBLE], ids=["nlgs", "ensemble"])
 def test_a_reset_can_be_forced_at_a_frame(settings):
     packing, snapshots = sheared_frames(5)
@@ -278,6 +280,7 @@ def test_only_the_ensemble_compares_two_starts():
     assert ensemble[3] < ensemble[1]
 
 
+@pytest.mark.thorough
 def test_two_starts_are_compared_until_they_agree_for_three_frames_and_after_a_reset():
     packing, snapshots = sheared_frames(8)
     with pytest.MonkeyPatch.context() as patch:

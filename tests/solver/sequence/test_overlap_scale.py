@@ -37,6 +37,7 @@ def squeezed(soft: SimulatedShear):
     return packing, snapshots
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("soft_grains", [True, False])
 def test_total_force_of_soft_grains_follows_their_overlap(squeezed, soft_grains) -> None:
     packing, snapshots = squeezed

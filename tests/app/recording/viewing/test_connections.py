@@ -146,6 +146,7 @@ def drip(connection: socket.socket, start: bytes, ended: threading.Event) -> Non
             connection.sendall(b"x")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_connection_with_the_cookie_is_kept_among_many_others(kind, tmp_path, hasty):
     with serving(kind, tmp_path) as gate, ExitStack() as stack:

@@ -72,6 +72,7 @@ def test_brown_rods_are_all_found(first: np.ndarray, rods: Rods, known: bool) ->
     assert np.abs(found.radius[index] - rods.radius).max() < 1.0
 
 
+@pytest.mark.thorough
 def test_brown_rods_are_followed_over_thirteen_pixels_and_five_degrees(
     laboratory: Laboratory, first: np.ndarray, rods: Rods, tmp_path: Path
 ) -> None:
