@@ -13,8 +13,7 @@ from .process.stages import FORCES
 from .process.version import library_versions
 from .results.manifest import Manifest
 from .run_folder import RECORDING, RESULTS, owner_of
-from .verdicts.decisions import fingerprint
-from .verdicts.log import VERDICTS, VerdictLog
+from .verdicts.log import VERDICTS, VerdictLog, fingerprint
 
 LISTED = 3  # files, and settings, that are named
 LONGEST = 40  # characters of a value

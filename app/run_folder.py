@@ -14,7 +14,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from . import __version__
 from .compilation.ahead import SOLVER_KERNELS, TRACKING_KERNELS, KernelsAhead
@@ -31,13 +31,14 @@ from .process.sources import hash_of_code
 from .process.stages import Stage
 from .process.version import library_versions
 from .results.checkpoint import Checkpoint
-from .results.hdf5.store import Provenance
+from .results.hdf5.provenance import Provenance
 from .results.manifest import MANIFEST, NAMES, Manifest
-from .results.results import Results
-from .solver.frame_forces import FrameForces
-from .solver.statistics.frame_statistics import FrameStatistics
-from .verdicts.decisions import fingerprint
-from .verdicts.log import VerdictLog
+from .verdicts.log import VerdictLog, fingerprint
+
+if TYPE_CHECKING:  # the first photograph is read before they are imported
+    from .results.results import Results
+    from .solver.frame_forces import FrameForces
+    from .solver.statistics.frame_statistics import FrameStatistics
 
 TRACKS, RESULTS, RECORDING, SUMMARY = "tracks.h5", "results.h5", "recording.rrd", "summary.json"
 REPORT = "tracking_report.html"
@@ -99,6 +100,11 @@ class Run:
         photographs = self.experiment.config.photographs is not None
         stages = (TRACKING_KERNELS, SOLVER_KERNELS) if photographs else (SOLVER_KERNELS,)
         return self.kernels.compiling(stages, self.progress)
+
+    def check_photographs(self) -> None:
+        """Read every photograph once, unless tracks are stored, before the libraries of the stages are loaded."""
+        if self.experiment.config.photographs is not None and not self.file(TRACKS).exists():
+            self.experiment.photographs().check()
 
     def file(self, name: str) -> Path:
         """Return the path of a file in the run's folder."""

@@ -15,32 +15,37 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 SAMPLE = ROOT / "sample_data/shear"
 CHECKOUT = ROOT / ".editable"
-# A command whose compilations are counted, and which notes when its first photograph was read.
+# A command whose compilations are counted, and which notes when its first photograph was read. Until then the compiler
+# must not be loaded, and so nothing is compiled.
 PROGRAM = """
 import json, sys, time
 from rodsight.cli.main import main
 imported = time.process_time()
 from rodsight.experiment import photographs
-from numba.core import event
 
-class Counter(event.Listener):
-    count = 0
-    def on_start(self, event):
-        self.count += 1
-    def on_end(self, event):
-        pass
-
-counter, first = Counter(), []
-event.register("numba:compile", counter)
+compiled, first = [], []
 read = photographs.content_of
 def read_noting(*args):
-    first.append(time.process_time())
+    if not first:
+        first.append(time.process_time())
+        assert "numba" not in sys.modules
+        count_compilations()
     return read(*args)
+def count_compilations():
+    from numba.core import event
+
+    class Counter(event.Listener):
+        def on_start(self, event):
+            compiled.append(event)
+        def on_end(self, event):
+            pass
+
+    event.register("numba:compile", Counter())
 photographs.content_of = read_noting
 try:
     main()
 finally:
-    print(json.dumps({"compilations": counter.count, "imported": imported, "first": first[0]}))
+    print(json.dumps({"compilations": len(compiled), "imported": imported, "first": first[0]}))
 """
 
 

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from ..experiment.jpeg_photographs import JpegPhotographs
-from ..experiment.scaling import make_scale
 from ..run_folder import Run
 from .terminal import print_line
 
@@ -44,6 +42,8 @@ def watching(run: Run, viewer: str, console: Console) -> Iterator[tuple[Run, Liv
 
 
 def _watch(run: Run, viewer: str, report: Callable[[str], None]) -> LiveProcess:
+    from ..experiment.jpeg_photographs import JpegPhotographs
+    from ..experiment.scaling import make_scale
     from ..recording.files.live_process import LiveProcess
 
     config = run.experiment.config

@@ -20,7 +20,7 @@ from ..process.kernel_cache import kernel_folder
 from ..process.lock import hold_folder
 from ..process.progress import Progress, no_progress
 from ..process.sources import APP
-from .kernel_list import FILE, Kernel, read_kernels
+from .kernel_list import FILE, Kernel, critical_times, read_kernels
 from .worker import COMPILED
 
 COMMAND = (sys.executable, "-c", "from rodsight.compilation.worker import main; main()")
@@ -34,7 +34,7 @@ class KernelsAhead:
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
-        self._waiting: list[int] = []  # places in the list of kernels that no process has begun
+        self._waiting: list[int] = []  # places in the list of kernels that no process has begun, the most urgent first
         self._open: set[int] = set()  # those that are not compiled yet
         self._kernels: tuple[Kernel, ...] = ()
         self._total = 0
@@ -51,7 +51,8 @@ class KernelsAhead:
         Parameters
         ----------
         parts : sequence of str
-            Beginnings of the names of modules, such as TRACKING_KERNELS and SOLVER_KERNELS.
+            Beginnings of the names of modules, such as TRACKING_KERNELS and SOLVER_KERNELS, in the order in which their
+            stages begin.
         progress : callable
         all_uses : bool
             Also those that `rodsight run` on photographs does not need, whatever the number of cores.
@@ -78,6 +79,8 @@ class KernelsAhead:
                 for k, each in enumerate(kernels)
                 if (each.of_run or all_uses) and each.module.startswith(tuple(parts))
             ]
+            times = critical_times(kernels, chosen)
+            chosen.sort(key=lambda k: (_stage_of(kernels[k], parts), -times[k]))
             threads = self._start(kernels, chosen, count, progress)
             try:
                 yield
@@ -132,7 +135,7 @@ class KernelsAhead:
         worker.wait()
 
     def _next(self) -> int | None:
-        """Return the first kernel whose own calls are compiled, waiting for one if need be; None: there is no other."""
+        """Return the next kernel whose own calls are compiled, waiting for one if need be; None: there is no other."""
         with self._changed:
             while self._waiting:
                 for place in self._waiting:
@@ -159,6 +162,11 @@ class KernelsAhead:
             assert worker.stdout is not None
             worker.stdout.close()
         self._workers.clear()
+
+
+def _stage_of(kernel: Kernel, parts: Sequence[str]) -> int:
+    """Return the place of the part that a kernel belongs to: parts are needed in their order."""
+    return next(n for n, part in enumerate(parts) if kernel.module.startswith(part))
 
 
 def _begin_worker() -> subprocess.Popen[str]:

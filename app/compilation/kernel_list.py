@@ -8,7 +8,7 @@ an old list costs time, never a wrong result.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from functools import reduce
 from importlib import import_module
@@ -46,6 +46,19 @@ def read_kernels(file: Path = FILE) -> tuple[Kernel, ...]:
     """Read the list; every kernel stands behind those that it calls."""
     rows = map(json.loads, file.read_text(encoding="utf-8").splitlines())
     return tuple(Kernel(**{**row, "arguments": tuple(row["arguments"]), "calls": tuple(row["calls"])}) for row in rows)
+
+
+def critical_times(kernels: Sequence[Kernel], chosen: Collection[int]) -> list[float]:
+    """Return the time [s] from the beginning of each kernel to the end of the last chosen one that depends on it.
+
+    Where the largest begins first, no process waits at the end for a long one that another compiles.
+    """
+    times = [0.0] * len(kernels)
+    for place in sorted(chosen, reverse=True):  # every kernel stands behind those that it calls
+        times[place] += kernels[place].seconds
+        for called in kernels[place].calls:
+            times[called] = max(times[called], times[place])
+    return times
 
 
 def write_kernels(kernels: Sequence[Kernel], file: Path = FILE) -> None:

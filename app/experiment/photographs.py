@@ -82,14 +82,19 @@ class Photographs(Sequence[Image]):
     def check(self) -> None:
         """Read every photograph once, so that a damaged one is reported before any work begins.
 
-        A PNG holds checksums and is not decoded for this where they are right.
+        A PNG holds checksums and is not decoded for this where they are right. Photographs that were read before
+        through the same input files are not read again.
         """
+        if self._inputs is not None and self.files in self._inputs.intact:
+            return
         for frame, file in enumerate(self.files):
             content = content_of(file, self._inputs, self._max_pixels)
             stated = claimed_size(content) if is_whole_png(content) else None
             shape = self.shape if self._selection.rotation in (90, 270) else self.shape[::-1]
             if stated is None or stated != shape:
                 self._check_size(frame, grey_of(file, content, self._selection))
+        if self._inputs is not None:
+            self._inputs.intact.add(self.files)
 
     def __len__(self) -> int:
         return len(self.files)

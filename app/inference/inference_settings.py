@@ -7,10 +7,8 @@ from dataclasses import dataclass, field, replace
 from ..experiment.config.experiment_file import ExperimentFile, InferenceSections
 from ..solver.bodies.grains import Array
 from ..solver.bodies.rods import RodMaterial
-from ..solver.boundary.boundary_correction import BoundarySettings
-from ..solver.calibration.priors import CalibrationSettings
 from ..solver.contacts.surface import typical_overlap
-from ..solver.nlgs.chain import ChainSettings
+from ..solver.part_settings import BoundarySettings, CalibrationSettings, ChainSettings
 from ..solver.sequence.settings import SequenceSettings
 
 FIRST_GUESS = 0.3  # of a friction that is measured from the motion

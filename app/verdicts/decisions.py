@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections import Counter
 from dataclasses import dataclass, field
 
@@ -120,16 +118,6 @@ def decide(log: VerdictLog, bodies: BodyNames, *, frames: FrameRange, frame_coun
         unknown,
         {frame: frozenset(each) for frame, each in flags.items()},
     )
-
-
-def fingerprint(log: VerdictLog) -> str:
-    """Return a hash of all latest verdicts and flags that affect the solver; empty without any."""
-    facts = [
-        [entry.reviewer, *(str(each) for each in entry.subject), str(entry.verdict), entry.on]
-        for entry in log.latest_entries()
-        if entry.verdict is not Verdict.UNSURE and (entry.flag is None or entry.on)
-    ]
-    return hashlib.sha256(json.dumps(sorted(facts)).encode()).hexdigest() if facts else ""
 
 
 def _keys(pairs: frozenset[tuple[int, int]], frame: int) -> NDArray[np.int64]:

@@ -12,6 +12,7 @@ their lines. A line cut by a crash is ignored and counted; the next entry begins
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import secrets
@@ -348,3 +349,13 @@ def _entry(file: Path, where: str, values: dict[str, Any]) -> Entry:
         seconds=seconds(), origin=member("origin", Origin, Origin.QUEUE),
         blind=bool(values.get("blind", False)), time=str(values.get("time", "")), line=str(values.get("line", where)),
     )  # fmt: skip
+
+
+def fingerprint(log: VerdictLog) -> str:
+    """Return a hash of all latest verdicts and flags that affect the solver; empty without any."""
+    facts = [
+        [entry.reviewer, *(str(each) for each in entry.subject), str(entry.verdict), entry.on]
+        for entry in log.latest_entries()
+        if entry.verdict is not Verdict.UNSURE and (entry.flag is None or entry.on)
+    ]
+    return hashlib.sha256(json.dumps(sorted(facts)).encode()).hexdigest() if facts else ""

@@ -17,9 +17,6 @@ from .fitted import FITTED
 
 POSTERIOR_CALIBRATION = 0.95  # true over self-estimated correlation of the posterior, where its input is right
 MAX_TRUST = 0.995  # above it a field would have all the weight
-# Largest trust in forces of soft grains from their overlaps.
-MAX_TRUST_MEASURED = 0.96  # the gaps show the overlaps; r .98 to .996 on simulated grains
-MAX_TRUST_STATED = 0.65  # softness is specified and no gap shows it; r .66 to .74 on photoelastic discs
 RELIABILITY_DISAGREEMENT: tuple[float, float] = tuple(FITTED["motion_reliability"]["disagreement"])
 RELIABILITY_CORRECTION: tuple[float, float] = tuple(FITTED["motion_reliability"]["correction"])
 WEIGHT_TERMS = ("constant", "correction", "unclear", "sliding", "members", "nearer")  # of the weight in fitted.toml

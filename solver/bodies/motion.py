@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int8, Int32
-from scipy.spatial import KDTree
 
 from .cell import Cell
 from .grains import Array, GrainMotion
@@ -226,6 +225,8 @@ def _velocities(snapshot: Snapshot, seen: LastSeen) -> tuple[Array, Array]:
     if len(new) and known.any():
         rows = np.flatnonzero(known)
         count = min(NEIGHBOURS, len(rows))
+        from scipy.spatial import KDTree  # materials are read before
+
         _, near = KDTree(snapshot.position[rows]).query(snapshot.position[new], k=count)
         velocity[new] = velocity[rows[np.reshape(near, (len(new), count))]].mean(axis=1)
     return velocity, spin

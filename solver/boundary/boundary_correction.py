@@ -10,18 +10,11 @@ from numpy.typing import NDArray
 
 from ..bodies.grains import Array
 from ..calibration.gaps import MeasuredSequence
+from ..part_settings import BoundarySettings
 from ..quantity import Quantity
 from .bars import Bars, find_wall_bars
 from .camera_pose import CameraPose, find_camera_pose
 from .continuation import continue_walls, extend_walls
-
-
-@dataclass(frozen=True, slots=True)
-class BoundarySettings:
-    """Which corrections of the boundary are made."""
-
-    camera: bool = True  # estimate the motion of the camera relative to the walls
-    continued: bool = True  # extend walls along rods beyond their ends
 
 
 @dataclass(frozen=True, slots=True)

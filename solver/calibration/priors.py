@@ -21,19 +21,6 @@ FINEST_SURFACE = 1e-5  # of the mean radius: below this no real grain is round
 
 
 @dataclass(frozen=True, slots=True)
-class CalibrationSettings:
-    """Which constant errors are estimated, and their prior standard deviations."""
-
-    pixel_size: float = 5e-3  # relative standard deviation of the given scale; 0: it is exact
-    lens: bool = True  # estimate the remaining radial distortion of the lens
-    radius_class: float = 1e-3  # relative error common to the rods of one radius class; 0: none
-    radius_offset: float = 4e-3  # relative error common to all radii; 0: none
-    # Whether radii were measured independently: those from photographs share the scale's error and cannot determine it.
-    radii_are_known: bool = True
-    radius_factor: float = 2e-2  # relative standard deviation of a factor common to all radii; 0: none
-
-
-@dataclass(frozen=True, slots=True)
 class CalibrationPriors:
     """Prior standard deviations of the constant errors. Zero: known exactly."""
 

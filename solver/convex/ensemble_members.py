@@ -12,7 +12,8 @@ from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts
 from ..detection.displacement import contact_displacement, displacement_scale
 from ..nlgs.force_memory import ForceMemory
-from .program import SLIP_SIGMAS, Balance, ConvexForces, ConvexSettings, soft_slip, solve_convex_member
+from ..part_settings import SLIP_SIGMAS
+from .program import Balance, ConvexForces, ConvexSettings, soft_slip, solve_convex_member
 
 EXACT = 1e-12  # [m] floor of the standard deviation of a sliding
 

@@ -27,27 +27,10 @@ from ..bodies.grains import Array, Grains
 from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts
 from ..contacts.kinematics import equilibrium_matrix, external_load
+from ..part_settings import ConvexSettings
 from .grain_blocks import GrainBlocks, block_balance
 from .interior_point import solve_program
 from .interior_point_kernels import Program
-
-# Standard deviation of u_t over that of a position: two grains, translation and rotation, two photographs.
-SLIP_SIGMAS = 2.8
-
-
-@dataclass(frozen=True, slots=True)
-class ConvexSettings:
-    """Dimensionless weights of the program."""
-
-    history: float = 3e-3  # λ, proximal weight of the previous forces
-    balance: float = 1e3  # ρ, penalty weight of the force residual
-    ambiguity_penalty: float = 0.3  # cost of force on a contact whose existence is uncertain
-    slip_noise: float = 1.5 * SLIP_SIGMAS  # [σ of a position] smaller slips count as zero
-    # ν where noise hides all sliding. On the apparatus at .0267° a photograph, where it is half of the sliding or more,
-    # the scale of forces was .956 and .990 without it and is .973 and .994 (seeds 2 and 1, 20 photographs).
-    noise_share: float = 0.06
-    projection_weight: float = 0.5  # λ of the projection onto equilibrium
-    tolerance: float = 3e-8  # of the interior-point method; force errors then stay below 0.1 %
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from ..bodies.motion import Snapshot
 from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts, detect_contacts, measure_contacts
 from ..contacts.pairs import join_keys, split_keys
+from ..part_settings import ContactProbabilitySettings
 from .displacement import displacement_scale
 from .touch_probability_kernels import CLOSES, DECAY, OPENS, STAYS_OPEN, smooth_candidates
 
@@ -29,21 +30,6 @@ LOWEST_GAP = -5.0  # [σ_g] deeper overlaps are clipped to this one and never ar
 FIRST_TOUCH = 0.5  # prior probability of touching
 LEAST_SIGMA = 1e-6  # [mean radius] of a gap: below the resolution of any photograph
 BACK, AHEAD = 4, 3  # frames of a window before and after its frame
-
-
-@dataclass(frozen=True, slots=True)
-class ContactProbabilitySettings:
-    """Noise of the measured gaps, and selection of the candidate pairs."""
-
-    overlap: float = 0.0  # [m] typical elastic overlap of a contact that bears force
-    radius_sd: float = 0.0  # [m] standard deviation of a grain's radius
-    margin: float = 20e-6  # [m] candidates have a gap below margin + reach · σ (+ overlap, 3 radius_sd) in some frame
-    reach: float = 6.0  # [σ]
-    least: float = 3e-3  # P(touch) below which a pair is no contact
-
-    def __post_init__(self) -> None:
-        if min(self.overlap, self.radius_sd, self.margin, self.reach, self.least) < 0:
-            raise ValueError("no contact probability setting may be negative")
 
 
 @dataclass(frozen=True, slots=True)

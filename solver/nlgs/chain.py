@@ -12,25 +12,12 @@ from ..bodies.packing import Packing
 from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts
 from ..detection.contact_networks import Network
+from ..part_settings import ChainSettings
 from .force_memory import ForceMemory
 from .interval import Interval
 from .problem import ContactProblem, inertial_impedance, kinematic_impedance
 from .solve import NlgsSettings, Solution, relative_force_residual, solve
-from .sweep_record import Keep, SweepHistory, SweepRecorder
-
-
-@dataclass(frozen=True, slots=True)
-class ChainSettings:
-    """Settings of the Gauss-Seidel chain."""
-
-    kappa: float | None = 0.05  # kinematic number; None: from the paper's time step
-    substeps: int = 5  # per interval
-    spin_up: int = 10  # sub-steps of an interval without previous forces
-    sweeps: int = 1000  # per sub-step; more sweeps regularise less
-    relaxation: float = 1.0  # above 1 selects another solution
-    force_change: float | None = None  # the paper's ε_f as a stopping level
-    reference_pressure: float = 1e4  # [Pa] scale of the forces if no wall carries a pressure
-    keep: Keep = "log"  # which sweeps keep their forces
+from .sweep_record import SweepHistory, SweepRecorder
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from ..bodies.grains import Array
 from ..contacts.contacts import Contacts
 from ..contacts.pairs import find_rows
+from ..part_settings import Keep
 from ..quantity import Quantity
 from .problem import ContactProblem
 from .solve import Sweep
 
-Keep = Literal["log", "all", "none"]
 FIRST = 8  # sweeps kept one by one before the spacing becomes logarithmic
 LOG_SPACED = 40  # sweeps kept of a frame
 MEASURED: dict[Keep, int] = {"all": 1, "log": 10, "none": 0}  # one in so many sweeps is measured; 0: only kept ones

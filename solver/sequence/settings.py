@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from ..assessment.mixture_trust import MAX_TRUST_MEASURED
 from ..bodies.grains import Array
 from ..contacts.surface import typical_overlap
-from ..convex.program import ConvexSettings
-from ..detection.touch_probability import ContactProbabilitySettings
-from ..nlgs.chain import ChainSettings
+from ..part_settings import MAX_TRUST_MEASURED, ChainSettings, ContactProbabilitySettings, ConvexSettings
 from ..posterior.posterior_settings import PosteriorSettings
 
 

@@ -95,10 +95,7 @@ def run(
 
     Example: rodsight run sample_data/shear --view web
     """
-    from ... import pipeline
     from ...run_folder import SUMMARY
-    from ...run_truth import load_truth
-    from ..summary_table import print_summary
     from ..watching import watching
     from .view_commands import show
 
@@ -112,11 +109,17 @@ def run(
     began = time.perf_counter()
     if follow:
         _follow(request, idle)
-    with open_run(request) as plain, watching(plain, view, console) as (run, watch):
-        results = pipeline.solve(run)
-        truth = load_truth(run, results)
-        recording = pipeline.record(run, results, truth)
-        summary = pipeline.conclude(run, results, truth, began)
+    with open_run(request) as plain:
+        plain.check_photographs()
+        from ... import pipeline  # after that, since all libraries are loaded here
+        from ...run_truth import load_truth
+        from ..summary_table import print_summary
+
+        with watching(plain, view, console) as (run, watch):
+            results = pipeline.solve(run)
+            truth = load_truth(run, results)
+            recording = pipeline.record(run, results, truth)
+            summary = pipeline.conclude(run, results, truth, began)
     if as_json:
         stored = json.loads(run.file(SUMMARY).read_text(encoding="utf-8"))  # with null for unknown numbers
         print(json.dumps({"folder": str(run.folder), "notes": run.notes, **stored}, indent=1))

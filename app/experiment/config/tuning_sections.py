@@ -10,8 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from ...solver.bodies.rods import RodMaterial
-from ...solver.boundary.boundary_correction import BoundarySettings
-from ...solver.calibration.priors import CalibrationSettings
+from ...solver.part_settings import BoundarySettings, CalibrationSettings
 from ...solver.sequence.settings import SequenceSettings
 from .corrections import SOLID_DENSITIES
 from .section import Finite, Frame, Pixels, Section, Switch, above, between, key, whole

@@ -48,6 +48,7 @@ class InputFiles:
         self._sums: dict[Path, str] = {}  # SHA-256 by file
         self.unused_columns: dict[Path, tuple[str, ...]] = {}  # of tables: names that nothing has read
         self._listed: dict[str, tuple[Path, ...]] = {}
+        self.intact: set[tuple[Path, ...]] = set()  # photographs that were read whole, all of one size
 
     def refuse_outside(self, file: Path) -> None:
         """Raise InputError for a file outside of the root."""

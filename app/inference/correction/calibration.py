@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...solver.bodies.grains import Array
 from ...solver.calibration.calibrate import EXCESSIVE_NOISE, Calibration, calibrate, default_priors
-from ...solver.calibration.priors import CalibrationSettings
+from ...solver.part_settings import CalibrationSettings
 from ...tracks import Tracks, WallTracks, held_once
 from ..snapshots import measure_sequence
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...solver.convex.program import SLIP_SIGMAS
 from ...solver.detection.displacement import displacement_scale
+from ...solver.part_settings import SLIP_SIGMAS
 from ...tracks import Tracks
 
 HIDDEN = 0.5  # displacement over the noise of a sliding: below it most of what is read is noise

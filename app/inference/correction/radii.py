@@ -18,8 +18,8 @@ from ...solver.bodies.rods import RodMaterial
 from ...solver.boundary.exchanged_sizes import find_exchanged_sizes
 from ...solver.boundary.size_classes import find_size_classes
 from ...solver.calibration.calibrate import Calibration
-from ...solver.calibration.priors import CalibrationSettings
 from ...solver.contacts.contacts import detect_contacts
+from ...solver.part_settings import CalibrationSettings
 from ...solver.posterior.radius_posterior import RadiusPosterior, estimate_radii, has_radius_errors
 from ...tracks import Tracks, WallTracks
 from ..snapshots import make_snapshots, measure_sequence

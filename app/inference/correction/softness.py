@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 
-from ...solver.assessment.mixture_trust import MAX_TRUST_MEASURED, MAX_TRUST_STATED
 from ...solver.bodies.packing import Packing
 from ...solver.bodies.rods import RodMaterial
 from ...solver.mixture.soft_grains import find_soft_overlap
 from ...solver.nlgs.chain import force_scale
+from ...solver.part_settings import MAX_TRUST_MEASURED, MAX_TRUST_STATED
 from ...solver.posterior.posterior_settings import PosteriorSettings
 from ...solver.posterior.sequence_evidence import gather_position_evidence
 from ...solver.sequence.settings import SequenceSettings

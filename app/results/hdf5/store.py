@@ -9,10 +9,9 @@ import json
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import h5py
 import numpy as np
@@ -28,29 +27,9 @@ from ..manifest import MANIFEST, Manifest
 from ..results import Results
 from ..schema import DEVIATIONS, SCHEMA, SCHEMA_VERSION
 from .file_creation import CACHED_BLOCKS, create_file
+from .provenance import Provenance
 from .reader import StoredRun
 from .writer import columns_of, write_columns, write_results
-
-
-@dataclass(frozen=True, slots=True)
-class Provenance:
-    """The input and settings of results; stored as attributes."""
-
-    fingerprint: str  # hash of the input and of the settings that affect the stored results
-    experiment: str  # name of the experiment file; earlier versions: its path
-    frames: FrameRange  # stored frames of the experiment
-    checksums: dict[str, str]  # SHA-256 by input file
-    inputs: str = ""  # hash of the input and the settings alone: the same for other code
-    code: str = ""  # hash of all sources that the results depend on
-    libraries: dict[str, str] = field(default_factory=dict)  # versions by name
-
-    @property
-    def program(self) -> dict[str, Any]:
-        """What the manifest stores beside the fingerprint, to distinguish other code from other input."""
-        return {"inputs": self.inputs, "code": self.code, "libraries": self.libraries}
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "frames", FrameRange(*self.frames))
 
 
 def save_tracks(file: Path, name: str, tracks: Tracks, walls: WallTracks | None, origin: Provenance) -> None:

@@ -67,13 +67,13 @@ def test_the_overview_loads_no_numerics():
 
 
 @pytest.mark.thorough
-def test_a_run_reads_its_first_photograph_before_it_imports_the_tracker(made_photographs, tmp_path):
+def test_a_run_reads_its_first_photograph_before_it_loads_the_libraries_of_the_stages(made_photographs, tmp_path):
     code = """
 import sys
 from rodsight.cli.main import main
 from rodsight.experiment import photographs
 def first(*arguments):
-    print(sorted({"rodsight.tracking.stage", "scipy.optimize", "rerun", "pandas"} & sys.modules.keys()))
+    print(sorted({"rodsight.pipeline", "numba", "scipy", "h5py", "cv2", "rerun", "pandas"} & sys.modules.keys()))
     sys.stdout.flush()
     __import__("os")._exit(0)
 photographs.content_of = first

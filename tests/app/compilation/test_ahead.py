@@ -66,6 +66,35 @@ def test_kernels_of_a_run_are_compiled_after_those_they_call_and_once(folder, mo
     assert given(log) == [0, 1, 2]  # no process is started again
 
 
+def test_long_chains_of_a_stage_begin_first_and_earlier_stages_before_later_ones(folder, monkeypatch):
+    listed = (
+        Kernel("solver.b", "small", (), 0.2),
+        Kernel("solver.b", "large", (), 2.0),
+        Kernel("solver.b", "called", (), 0.1),
+        Kernel("solver.b", "calling", (), 3.0, (2,)),
+        Kernel("solver.b", "rare", (), 9.0, (0,), of_run=False),
+        Kernel("tracking.a", "leaf", (), 0.1),
+    )
+    monkeypatch.setattr(ahead, "read_kernels", lambda: listed)
+    log = use(monkeypatch, folder, COMPILES)
+    monkeypatch.setattr(ahead, "_begin_worker", one_worker())
+    assert compile_all().is_complete
+    assert given(log) == [5, 2, 3, 1, 0]
+
+
+def one_worker():
+    """Start the first process only, so that the order is certain."""
+    begin, begun = ahead._begin_worker, []
+
+    def first():
+        if begun:
+            raise OSError("no further process")
+        begun.append(True)
+        return begin()
+
+    return first
+
+
 def test_a_wheel_gets_the_kernels_of_all_uses(folder, monkeypatch):
     log = use(monkeypatch, folder, COMPILES)
     assert compile_all(all_uses=True).is_complete

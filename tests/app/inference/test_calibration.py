@@ -14,7 +14,8 @@ from rodsight.inference.inference_settings import radii_are_metres, settings_of
 from rodsight.results.calibration_summary import calibration_facts
 from rodsight.solver.calibration.calibrate import Calibration, calibrate
 from rodsight.solver.calibration.gaps import MeasuredSequence
-from rodsight.solver.calibration.priors import CalibrationPriors, CalibrationSettings
+from rodsight.solver.calibration.priors import CalibrationPriors
+from rodsight.solver.part_settings import CalibrationSettings
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
 RADIUS = 8e-3  # [m]

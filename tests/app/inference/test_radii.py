@@ -13,7 +13,7 @@ from rodsight.solver.bodies.motion import Snapshot
 from rodsight.solver.bodies.packing import Packing
 from rodsight.solver.bodies.rods import RodMaterial
 from rodsight.solver.boundary import size_classes
-from rodsight.solver.calibration.priors import CalibrationSettings
+from rodsight.solver.part_settings import CalibrationSettings
 from rodsight.solver.posterior.radius_posterior import RadiusPosterior
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
 

@@ -12,9 +12,9 @@ from rodsight.experiment.walls import read_walls
 from rodsight.inference.correction import softness
 from rodsight.inference.correction.softness import assume_softness, find_softness
 from rodsight.inference.inference_settings import material_of, settings_of
-from rodsight.solver.assessment.mixture_trust import MAX_TRUST_MEASURED, MAX_TRUST_STATED
 from rodsight.solver.bodies.rods import RodMaterial
 from rodsight.solver.nlgs.chain import force_scale
+from rodsight.solver.part_settings import MAX_TRUST_MEASURED, MAX_TRUST_STATED
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
 from tests.solver.posterior.test_sequence_evidence import RADIUS, lattice_sequence

@@ -7,8 +7,8 @@ import threading
 import pytest
 from rodsight.process.errors import InputError
 from rodsight.process.frame_range import FrameRange
-from rodsight.verdicts.decisions import BodyNames, decide, fingerprint
-from rodsight.verdicts.log import Entry, Flag, Origin, Verdict, VerdictLog
+from rodsight.verdicts.decisions import BodyNames, decide
+from rodsight.verdicts.log import Entry, Flag, Origin, Verdict, VerdictLog, fingerprint
 from rodsight.verdicts.table import export_verdicts, import_verdicts
 
 BODIES = BodyNames((1, 2, 3, 7), ("top", "12"))

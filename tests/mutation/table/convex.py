@@ -8,6 +8,7 @@ TWIN = "tests/reference/test_convex_program.py"
 SLIDING = "tests/solver/convex/test_sliding_model.py"
 
 MUTANTS = [
+    *mutants_of("solver/part_settings.py", PROGRAM, ("balance: float = 1e3", "balance: float = 1.0")),
     *mutants_of(
         "solver/convex/program.py",
         PROGRAM,
@@ -19,7 +20,6 @@ MUTANTS = [
             "weight[2 * n : 3 * n] /= lever",
             "weight[2 * n : 3 * n] *= lever",
         ),
-        ("balance: float = 1e3", "balance: float = 1.0"),
         ("load = np.append(load, total / force_unit)", "load = np.append(load, total)"),
         ("np.tile(present, 3)", "np.tile(np.ones_like(present), 3)"),
     ),
