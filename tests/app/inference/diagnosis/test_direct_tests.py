@@ -25,14 +25,14 @@ N, RADIUS = SIDE * SIDE, 0.008
 STEP = 6e-3  # of shear between two photographs
 
 
-def rolling_tracks():
+def rolling_tracks(step=STEP, noise=None):
     """Layers of rods that slide past one another in alternating directions, each rolling on its neighbours."""
     x, y = (each.ravel() * PITCH + RADIUS for each in np.meshgrid(np.arange(SIDE), np.arange(SIDE)))
     rng = np.random.default_rng(2)
     layer = np.cumsum(rng.normal(0.0, 1.0, SIDE))[(y // PITCH).astype(int)]
     time = np.arange(FRAMES)[:, None]
-    position = np.stack([x + STEP * PITCH * layer * time, np.broadcast_to(y, (FRAMES, N))], axis=-1)
-    position = position + NOISE * rng.standard_normal(position.shape)
+    position = np.stack([x + step * PITCH * layer * time, np.broadcast_to(y, (FRAMES, N))], axis=-1)
+    position = position + (NOISE if noise is None else noise) * rng.standard_normal(position.shape)
     flat = np.full((FRAMES, N), NOISE)
     return Tracks(
         np.arange(N), np.full(N, RADIUS), 30.0 * np.arange(FRAMES), position, np.zeros((FRAMES, N)), flat,
@@ -47,14 +47,14 @@ def box(frames=FRAMES):
     return WallTracks(("bottom", "top"), np.repeat(ends[None], frames, axis=0), np.array([np.nan, 5e4]))
 
 
-def with_rolling(factor):
-    """The same with the rotations that rolling leads to expect, times a factor."""
+def with_rolling(factor, step=STEP):
+    """The same with the rotations that rolling without noise leads to expect, times a factor."""
     from rodsight.solver.inferred.unknown_rotations import fill_unknown_rotations
 
-    tracks, walls = rolling_tracks(), box()
+    tracks, exact, walls = rolling_tracks(step), rolling_tracks(step, 0.0), box()
     unknown = np.full_like(tracks.rotation, np.nan)
     expected = fill_unknown_rotations(
-        tracks.radius, tracks.position, unknown, tracks.present, walls.endpoints, side=walls.side, cell=None
+        exact.radius, exact.position, unknown, exact.present, walls.endpoints, side=walls.side, cell=None
     )
     return replace(tracks, rotation=factor * expected)
 
@@ -64,6 +64,23 @@ def with_rolling(factor):
 )
 def test_wrong_rotations_are_recognised(factor, cause):
     found = examine_rotations(with_rolling(factor), box())
+    assert [each.cause for each in found] == ([] if cause is None else [cause])
+
+
+def test_rotations_that_noise_hides_from_one_photograph_to_the_next_are_compared_over_several():
+    small = 3.0 * NOISE / PITCH
+    assert [each.cause for each in examine_rotations(with_rolling(-1.0, small), box())] == ["rotation_sign"]
+    assert examine_rotations(with_rolling(1.0, small), box()) == []
+
+
+@pytest.mark.parametrize(("factor", "cause"), [(1.0, None), (-1.0, "rotation_sign"), (57.3, "rotation_in_degrees")])
+def test_rods_that_turn_with_the_packing_show_wrong_rotations(factor, cause):
+    tracks = rolling_tracks(0.0)
+    angle = 0.01 * np.arange(FRAMES)
+    turn = np.moveaxis(np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]), 2, 0)
+    noise = 1e-3 * np.random.default_rng(1).normal(size=(FRAMES, N))
+    turned = replace(tracks, position=tracks.position @ turn, rotation=factor * (angle[:, None] + noise))
+    found = examine_rotations(turned, box())
     assert [each.cause for each in found] == ([] if cause is None else [cause])
 
 
