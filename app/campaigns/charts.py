@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ..figures.figure_style import COLOURS, GRID, INK, new_figure, paper_style
+from ..figures.figure_style import COLOURS, DASHES, GRID, INK, new_figure, paper_style
 from .collect import Row
 
 Curve = Sequence[float | None]
@@ -20,6 +20,7 @@ RESULTS = {
     "friction_angle_degrees": "friction angle [°]", "coordination_number": "coordination number", "trust": "trust",
     "r_fn": "r(f_n)",
 }  # fmt: skip
+MARKERS = "os^vDP"  # of curves with names, which differ in grey by these and their dashes
 NAMED = 6  # curves with names of their own; more are drawn in grey, with their median
 
 
@@ -83,8 +84,12 @@ def draw_over_frames(curves: Mapping[str, Curve], label: str) -> str:
             known = [(k, value) for k, value in enumerate(curve) if value is not None]
             if known:
                 colour = GRID if many else COLOURS[number % len(COLOURS)]
-                dash = "--" if number >= len(COLOURS) and not many else "-"
-                axes.plot(*zip(*known, strict=True), dash, color=colour, label=None if many else name)
+                mark = (
+                    {}
+                    if many
+                    else {"linestyle": DASHES[number % len(DASHES)], "marker": MARKERS[number % len(MARKERS)]}
+                )
+                axes.plot(*zip(*known, strict=True), color=colour, label=None if many else name, **mark)
         if many:
             middle = [(k, value) for k, value in enumerate(_medians(list(curves.values()))) if value is not None]
             axes.plot(*zip(*middle, strict=True), color=INK, linewidth=1.6, label=f"median of {len(curves)} runs")

@@ -13,6 +13,7 @@ from ..solver.boundary.continuation import bearing_past_ends
 from ..solver.calibration.gaps import MeasuredSequence
 from ..tracks import Tracks, WallTracks
 from .boundary import free_surfaces
+from .config.corrections import DIGITS, SOLID_DENSITIES
 from .experiment import Experiment
 
 NEIGHBOURS = 8  # nearest centres of a grain, which include the one closest in units of radii
@@ -20,6 +21,7 @@ SPACING = (0.93, 1.15)  # of neighbours over their radii, median: packed rods to
 GREATEST_RADIUS = 0.5  # [m] of a rod
 GREATEST_FRACTION = 2.0  # of the packing's diagonal: no radius is larger
 MISTAKE_TOLERANCE = 0.15  # relative difference between a spacing and that of a known mistake, at most
+HEAVIEST_IN_G_PER_CM3 = 1e-3 * SOLID_DENSITIES[1]
 STRENGTH = 1e8  # [Pa] mean stress: contacts of rods then carry several times that, and metals yield
 OPEN = 1e-6  # [rad] two parallel walls face each other within this
 SIDE_OF_PACKING = {
@@ -39,6 +41,7 @@ def check_packing(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> 
     sides = open_sides(walls) if walls.cell is None and tracks.boundary is None else []
     return [
         *rods_beyond_ends(tracks, walls),
+        *implausible_density(experiment.config.material.density),
         *implausible_loads(experiment, tracks, walls),
         *sides,
         *free_surfaces(experiment, tracks, walls),
@@ -87,6 +90,16 @@ def _cause_of_spacing(found: float) -> str:
         (1e-3, "radii look like millimetres"),
     )
     return next((f": {cause}" for factor, cause in causes if abs(found / factor - 1.0) < MISTAKE_TOLERANCE), "")
+
+
+def implausible_density(density: float) -> list[str]:
+    """Return a warning where a density [kg/m³] is the number of a heavy metal in g/cm³; foams alone are so light."""
+    if density > HEAVIEST_IN_G_PER_CM3:
+        return []
+    return [
+        f"material.density = {density:g} kg/m³ is that of the lightest foams: if it is in g/cm³, write density = "
+        f"{1e3 * density:.{DIGITS}g}"
+    ]
 
 
 def implausible_loads(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> list[str]:

@@ -29,7 +29,7 @@ WARNINGS = {
     "solver/assessment/status.py": ("decide_status", "_decide", "find_faults", "_describe_change"),
     "solver/calibration/calibrate.py": ("_verdict", "_track_warning", "_prior_warning"),
     "solver/boundary/boundary_correction.py": ("describe",),
-    "app/experiment/plausibility.py": ("implausible_loads", "open_sides", "rods_beyond_ends"),
+    "app/experiment/plausibility.py": ("implausible_density", "implausible_loads", "open_sides", "rods_beyond_ends"),
     "app/experiment/boundary.py": ("free_surfaces",),
     "app/inference/diagnosis/data_quality.py": ("describe", "obstacle"),
     "app/prediction.py": ("verdict",),

@@ -29,7 +29,12 @@ if TYPE_CHECKING:
 TABLE = Path(__file__).parent / "growth.csv"
 DRAWN = PICTURE.with_name("speed_growth.svg")
 BETWEEN_WALLS, IN_A_CELL = "rods between walls", "rods of a periodic cell"
-COLOURS = {BETWEEN_WALLS: "#0072b2", IN_A_CELL: "#d55e00"}
+# Colour and line, by which curves differ in grey and for colour-blind readers, too.
+STYLES = {
+    BETWEEN_WALLS: {"color": "#0072b2", "marker": "o"},
+    IN_A_CELL: {"color": "#d55e00", "marker": "s", "ls": "--"},
+}
+SOLVING, RECORDING = {"color": "#009e73", "marker": "o"}, {"color": "#cc79a7", "marker": "s", "ls": "--"}
 WALLED = ((250, 24), (1172, 24), (5000, 8), (10_000, 6))  # rods, frames
 LONG = (250, (24, 150, 600))  # rods, frames of as many sequences
 STEP = 0.05  # [°] of shear between two frames of those, small for a limited total shear
@@ -165,7 +170,7 @@ def _write(jobs: list[Job], file: Path = TABLE) -> None:
 
 
 def draw(jobs: list[Job], picture: Path = DRAWN) -> None:
-    """Seconds of a frame and memory over the rods, seconds of a run over the frames; the machine measured last."""
+    """Seconds of a frame over the rods, seconds of a run over the frames; the machine measured last."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -173,13 +178,12 @@ def draw(jobs: list[Job], picture: Path = DRAWN) -> None:
     # The later one where a packing of the sizes has as many frames.
     long = list({each.frames: each for each in own if each.rods == LONG[0] and each.frames in LONG[1]}.values())
     with mpl.rc_context({"svg.hashsalt": "rodsight", "svg.fonttype": "none", "font.size": 8}):
-        page = Figure(figsize=(10.0, 3.2), layout="constrained")
-        seconds, memory, length = page.subplots(1, 3)
-        for kind, colour in COLOURS.items():
+        page = Figure(figsize=(8.0, 3.2), layout="constrained")
+        seconds, length = page.subplots(1, 2)
+        for kind, style in STYLES.items():
             some = sorted((each for each in own if each.kind == kind and each not in long), key=lambda each: each.rods)
             rods = [each.rods for each in some]
-            seconds.plot(rods, [each.solving / each.frames for each in some], "o-", color=colour, ms=4, label=kind)
-            memory.plot(rods, [each.peak / 1e3 for each in some], "o-", color=colour, ms=4)
+            seconds.plot(rods, [each.solving / each.frames for each in some], ms=4, label=kind, **style)
         limits = {rods: float(aim.strip("≤ s")) for rods, aim in AIMS.items()}
         seconds.plot(list(limits), list(limits.values()), "_", color="black", ms=12, label="aim")
         _frame(
@@ -187,11 +191,9 @@ def draw(jobs: list[Job], picture: Path = DRAWN) -> None:
         )
         seconds.set_yscale("log")
         seconds.legend(frameon=False)
-        _frame(memory, "peak of memory [GB]", "rods", (250, 1172, 5000, 10_000))
-        memory.set_ylim(bottom=0.0)
         frames = [each.frames for each in long]
-        length.plot(frames, [each.solving for each in long], "o-", color="#009e73", ms=4, label="solving")
-        length.plot(frames, [each.recording for each in long], "o-", color="#cc79a7", ms=4, label="recording")
+        length.plot(frames, [each.solving for each in long], ms=4, label="solving", **SOLVING)
+        length.plot(frames, [each.recording for each in long], ms=4, label="recording", **RECORDING)
         _frame(length, f"a run of {LONG[0]} rods [s of the processor]", "frames", LONG[1])
         length.set_yscale("log")
         length.legend(frameon=False)

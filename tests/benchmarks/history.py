@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from datetime import date
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rodsight.process.atomic import write_atomically
 
@@ -32,7 +32,8 @@ COLOURS = (
     "#cc79a7",
     "#56b4e9",
     "#e69f00",
-)  # of machines; distinguishable with colour blindness
+)  # of machines; distinguishable with colour blindness …
+MARKERS, LINES = "os^Dv", ("-", "--", ":", "-.")  # … and in grey
 
 
 class Entry(NamedTuple):
@@ -99,10 +100,7 @@ def draw(entries: list[Entry], picture: Path = PICTURE) -> None:
             _draw_figure(panel, [entry for entry in entries if entry.figure == figure], commits, machines)
         for panel in panels[len(figures) :]:
             panel.set_axis_off()
-        handles = [
-            mpl.lines.Line2D([], [], color=COLOURS[k % len(COLOURS)], marker="o", label=machine)
-            for k, machine in enumerate(machines)
-        ]
+        handles = [mpl.lines.Line2D([], [], label=machine, **_style(k)) for k, machine in enumerate(machines)]
         page.legend(handles=handles, loc="outside lower center", frameon=False)
         text = io.BytesIO()
         page.savefig(text, format="svg", metadata={"Date": None})
@@ -116,12 +114,17 @@ def _draw_figure(panel: Axes, entries: list[Entry], commits: list[str], machines
         middle = [entry.median for entry in own]
         below = [entry.median - entry.least for entry in own]
         above = [entry.greatest - entry.median for entry in own]
-        panel.errorbar(place, middle, [below, above], fmt="o-", color=COLOURS[k % len(COLOURS)], ms=3.0, capsize=2.0)
+        panel.errorbar(place, middle, [below, above], ms=3.0, capsize=2.0, **_style(k))
     panel.set_title(f"{entries[0].figure.replace('`', '')}\n[{entries[0].unit}]", fontsize=8)
     panel.set_xticks(range(len(commits)), [commit[:7] for commit in commits], rotation=30 if len(commits) > 3 else 0)
     panel.set_xlim(-0.5, len(commits) - 0.5)
     panel.set_ylim(0.0, 1.15 * max(entry.greatest for entry in entries))
     panel.grid(axis="y", lw=0.3)
+
+
+def _style(k: int) -> dict[str, Any]:
+    """Return the colour, mark and line of machine k."""
+    return {"color": COLOURS[k % len(COLOURS)], "marker": MARKERS[k % len(MARKERS)], "ls": LINES[k % len(LINES)]}
 
 
 def _median_and_range(rounds: tuple[float, ...]) -> tuple[float, float, float]:

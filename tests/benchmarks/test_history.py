@@ -37,9 +37,20 @@ def test_the_plot_of_the_history_is_up_to_date(tmp_path):
 @pytest.mark.thorough
 def test_the_plot_of_the_growth_is_up_to_date(tmp_path):
     jobs = growth.read()
-    assert {each.kind for each in jobs} == set(growth.COLOURS)
+    assert {each.kind for each in jobs} == set(growth.STYLES)
     growth.draw(jobs, tmp_path / "drawn.svg")
     assert (tmp_path / "drawn.svg").read_text() == growth.DRAWN.read_text(), "python -m tests.benchmarks.growth"
+
+
+def test_curves_of_one_panel_differ_without_colour():
+    panels = [
+        growth.STYLES.values(),
+        (growth.SOLVING, growth.RECORDING),
+        map(history._style, range(len(history.COLOURS))),
+    ]
+    for panel in panels:
+        looks = [(style["marker"], style.get("ls", "-")) for style in panel]
+        assert len(set(looks)) == len(looks)
 
 
 def test_growth_is_reported_as_a_power_of_the_number_of_rods():

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
-from rodsight.campaigns.charts import draw_over_frames, draw_over_parameter, varied_parameters
+from rodsight.campaigns.charts import NAMED, draw_over_frames, draw_over_parameter, varied_parameters
 from rodsight.campaigns.collect import setting_of
 from rodsight.campaigns.report import write_report
+from rodsight.figures.figure_style import DASHES
 
 ROWS = [
     {"run": f"r{k}", "material.friction": text, "solver.kappa": "0.1", "friction_angle_degrees": 10.0 + k, "trust": 0.9}
@@ -36,6 +38,13 @@ def test_every_run_is_drawn_over_frames_and_many_have_a_median():
     many = draw_over_frames({str(k): [None, float(k), 2.0 * k] for k in range(50)}, "trust")
     assert ">median of 50 runs<" in many
     assert many.count("<path") > 50
+
+
+def test_named_curves_differ_without_colour():
+    chart = draw_over_frames({str(k): [float(k), k + 1.0, k + 2.0] for k in range(NAMED)}, "trust")
+    assert len(set(re.findall(r"stroke-dasharray: [^;]*", chart))) == len(DASHES) - 1  # the first is unbroken
+    marks = set(re.findall(r'<path id="m\w+" d="([^"]*)"', chart))
+    assert len(marks) == NAMED + 2  # and the ticks of both axes
 
 
 def test_a_run_has_the_range_of_its_frames_and_the_deviation_of_its_forces():

@@ -66,6 +66,12 @@ def test_a_very_small_pressure_gives_a_warning(tracked, capsys):
     assert "did you mean 50e3 Pa?" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(("density", "warns"), [(11.34, True), (22.6, True), (23.5, False), (150.0, False)])
+def test_a_density_that_may_be_in_other_units_gives_a_warning(tracked, capsys, density, warns):
+    assert rodsight("check", tracked, "--no-budget", "--set", f"material.density={density}") == 0
+    assert (f"if it is in g/cm³, write density = {1e3 * density:g}" in capsys.readouterr().out) == warns
+
+
 @pytest.mark.thorough
 def test_an_open_side_is_reported_with_the_walls_beside_it(tracked, capsys):
     edit(tracked / "experiment.toml", 'truth = "truth_contacts.csv"', "")  # the truth refers to the wall

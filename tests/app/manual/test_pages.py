@@ -154,11 +154,10 @@ def folder(examples: Path) -> Path:
 
 
 def python_blocks() -> Iterator[Any]:
-    """Yield each page with the number and the text of a Python block; those that start processes are slow."""
+    """Yield each page with the number and the text of a Python block."""
     for page, text in TEXTS.items():
         for number, block in enumerate(blocks(text, "python")):
-            marks = [pytest.mark.slow] if "rodsight.campaign(" in block else []  # as in the function's own example
-            yield pytest.param(page, number, block, id=f"{page}-{number}", marks=marks)
+            yield pytest.param(page, number, block, id=f"{page}-{number}")
 
 
 @pytest.mark.thorough
