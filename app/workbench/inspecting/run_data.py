@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from enum import IntEnum
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -228,8 +229,7 @@ def frame_network(data: RunData, photograph: int, scale: Scale) -> dict[str, Any
         "fn": rounded(forces.fn), "ft": rounded(forces.ft),
         "fn_sd": rounded(forces.fn_sd), "ft_sd": rounded(forces.ft_sd),
         "gap": rounded(contacts.gap), "probability": rounded(forces.probability), "age": forces.age.tolist(),
-        "state": [ContactState(each).name.lower() for each in forces.state.tolist()],
-        "source": [ContactSource(each).name.lower().replace("_", " ") for each in forces.source.tolist()],
+        "state": _names(ContactState, forces.state), "source": _names(ContactSource, forces.source),
         "mean_fn": rounded_one(data.statistics[frame].mean_fn), "range": _force_range(data),
         "rods": list_rods(tracks, frame, scale),
     }  # fmt: skip
@@ -244,8 +244,13 @@ def list_rods(tracks: Tracks, frame: int, scale: Scale) -> dict[str, Any]:
         "id": tracks.id[here].tolist(), "x": np.round(place[:, 0], 2).tolist(), "y": np.round(place[:, 1], 2).tolist(),
         "r": np.round(tracks.radius[here] / pixel, 2).tolist(), "zncc": rounded(tracks.zncc[frame, here]),
         "angle": rounded(-tracks.rotation[frame, here]),
-        "status": [TrackStatus(each).name.lower() for each in tracks.status[frame, here].tolist()],
+        "status": _names(TrackStatus, tracks.status[frame, here]),
     }  # fmt: skip
+
+
+def _names(kind: type[IntEnum], values: NDArray[Any]) -> list[str]:
+    words = {each.value: each.name.lower().replace("_", " ") for each in kind}
+    return [words[each] for each in values.tolist()]
 
 
 def contact_history(data: RunData, i: int | str, j: int | str) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import { Picture, moveTo } from "/page/picture.js";
 const LOUPE = 172, LOUPE_TOP = 52, MAGNIFIED = 6;
 const HINT = 36; // [px] above the picture, for the hint and the layers
 const LARGE = 2200, ENLARGED = 1.5; // [px] of the stage, beyond which the page is enlarged (style.css)
-const IDLE = 300; // [ms] after which the neighbours of a picture are requested
+const IDLE = 300; // [ms] without a change, after which a new picture is drawn sharply and its neighbours are requested
 const MARGIN = 0.12; // [of the stage] drawn around it, so that a movement uncovers what is there already
 const SETTLED = 180; // [ms] without a movement, after which the drawing is made anew
 const MAGNIFICATION = [0.4, 2.5]; // of a former drawing, beyond which it is made anew at once
@@ -24,8 +24,8 @@ export class Stage {
     this.picture = new Picture(at("photograph"), () => this.shift());
     this.wanted = ""; this.width = 0; this.height = 0;
     this.draw = () => {}; this.waits = () => false; this.fixed = () => {}; this.tool = {}; this.loupe = false; this.mouse = null;
-    this.pending = false; this.drawn = 0; this.fitted = ""; this.idle = 0;
-    this.drawing = { canvas: at("drawing"), view: null, stale: true, settling: 0 };
+    this.pending = false; this.drawn = 0; this.fitted = ""; this.beside = null;
+    this.drawing = { canvas: at("drawing"), view: null, stale: true, settling: 0, dense: 1, coarse: false };
     this.window = [0, 0, 0, 0]; // [px] left, top, right, bottom of what is being drawn
     this.cursor = null; this.pressed = null; // of the keyboard: a place, and where it was pressed
     new ResizeObserver(() => { this.resize(); }).observe(this.canvas.parentElement);
@@ -39,17 +39,19 @@ export class Stage {
     if (!url && !this.isFitted()) this.fit();
     if (url === this.wanted) { this.redraw(); return; }
     this.wanted = url;
-    clearTimeout(this.idle);
+    this.drawing.coarse = true; // four times the pixels cost the browser more than twice the time: they come once it is still
+    this.beside = null;
+    clearTimeout(this.drawing.settling);
     this.unreadable("");
     try { if (!(await this.picture.show(url))) return; } catch (error) { this.unreadable(error.message); this.redraw(); return; } // never the picture of another one
     if (this.wanted !== url) return;
-    if (url) this.idle = setTimeout(() => this.picture.foresee(beside), IDLE);
+    if (url) this.beside = beside;
     if (!this.isFitted()) this.fit();
     this.redraw();
   }
 
-  /** Forget the picture: another experiment is opened. */
-  clear() { this.wanted = ""; this.picture.clear(); this.unreadable(""); this.redraw(); }
+  /** Forget the picture and the view: another experiment is opened, whose photographs may be as large. */
+  clear() { this.wanted = ""; this.fitted = ""; this.picture.clear(); this.unreadable(""); this.redraw(); }
 
   unreadable(text) {
     at("unreadable").hidden = !text;
@@ -105,10 +107,18 @@ export class Stage {
   redraw() { this.drawing.stale = true; this.request(); }
 
   /** The view alone has changed: the drawing is moved, and made anew once the view is still. */
-  shift() {
+  shift() { this.settle(SETTLED); this.request(); }
+
+  /** Once nothing has changed for a while: make the drawing anew, as sharp as the screen; request the pictures beside. */
+  settle(after) {
     clearTimeout(this.drawing.settling);
-    this.drawing.settling = setTimeout(() => { if (this.isExact()) this.request(); else this.redraw(); }, SETTLED);
-    this.request();
+    this.drawing.settling = setTimeout(() => {
+      if (this.beside) this.picture.foresee(this.beside);
+      this.beside = null;
+      if (this.waits() || this.drawing.stale) return; // what it waits for is drawn when it comes, and then this is done again
+      this.drawing.coarse = false;
+      if (this.isExact()) this.request(); else this.redraw();
+    }, after);
   }
 
   request() {
@@ -117,14 +127,14 @@ export class Stage {
     requestAnimationFrame(() => { this.pending = false; this.paint(); });
   }
 
-  isExact() { const { view } = this.drawing; return Boolean(view) && view.x === this.view.x && view.y === this.view.y && view.k === this.view.k; }
+  isExact() { const { view, dense } = this.drawing; return Boolean(view) && view.x === this.view.x && view.y === this.view.y && view.k === this.view.k && dense === (devicePixelRatio || 1); }
 
   paint() {
     const { view, drawing } = this, dense = devicePixelRatio || 1, by = drawing.view ? view.k / drawing.view.k : 0;
     const anew = drawing.stale || by < MAGNIFICATION[0] || by > MAGNIFICATION[1];
-    if (anew) this.renew(dense);
+    if (anew) this.renew(drawing.coarse ? Math.min(dense, 1) : dense);
     this.picture.place(view, this.width, this.height, dense, this.dim ?? 1);
-    moveTo(drawing.canvas, (drawing.left - view.x) * view.k, (drawing.top - view.y) * view.k, view.k / drawing.view.k / dense);
+    moveTo(drawing.canvas, (drawing.left - view.x) * view.k, (drawing.top - view.y) * view.k, view.k / drawing.view.k / drawing.dense);
     if (anew || this.loupe || this.cursor) this.paintFixed(dense);
     this.drawn += 1;
     const k = this.loupe && this.mouse ? Math.max(view.k * MAGNIFIED, 6) : view.k;
@@ -133,10 +143,11 @@ export class Stage {
 
   visible(view = this.view) { return [view.x, view.y, view.x + this.boxWidth / view.k, view.y + this.boxHeight / view.k]; }
 
-  /** Draw the step anew, with a margin. */
+  /** Draw the step anew, with a margin, at so many pixels of the drawing per pixel of the page. */
   renew(dense) {
     const { drawing, view } = this, { canvas } = drawing, waits = this.waits();
     canvas.style.visibility = waits ? "hidden" : "";
+    if (drawing.coarse) this.settle(IDLE);
     if (waits && drawing.view) { drawing.stale = false; return; } // a canvas that is hidden need not be emptied
     const wide = Math.round((1 + 2 * MARGIN) * this.boxWidth * dense), high = Math.round((1 + 2 * MARGIN) * this.boxHeight * dense);
     if (canvas.width !== wide || canvas.height !== high) { canvas.width = wide; canvas.height = high; }
@@ -146,7 +157,7 @@ export class Stage {
     c.setTransform(dense * view.k, 0, 0, dense * view.k, -dense * view.k * left, -dense * view.k * top);
     this.window = [left, top, left + wide / dense / view.k, top + high / dense / view.k];
     this.draw(c, view.k / this.enlarged);
-    Object.assign(drawing, { view: { ...view }, left, top, stale: false });
+    Object.assign(drawing, { view: { ...view }, left, top, dense, stale: false });
   }
 
   /** Legends, the loupe, the keyboard's cursor. */

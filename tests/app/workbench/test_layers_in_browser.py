@@ -8,7 +8,7 @@ from typing import Literal
 import cv2
 import numpy as np
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, Page, expect
 from rodsight.recording.curve_layers.settling import STATUS_COLOURS
 from rodsight.results.hdf5.store import load_results, origin_of, save_results
 
@@ -28,7 +28,7 @@ def inspect(tab: Page) -> None:
     go(tab, "inspect")
     tab.evaluate(f"workbench.show({FRAME})")
     idle(tab)
-    tab.wait_for_function("workbench.step.isLoaded(workbench)")
+    tab.wait_for_function("() => workbench.step.isLoaded(workbench)")
     tab.evaluate(f"workbench.stage.fit({BOX})")
 
 
@@ -206,6 +206,35 @@ def test_marks_of_pairs_differ_by_shape_where_their_colours_may_not(tab: Page):
     assert inside == {kind: [False, False, False] for kind in ("detected", "undetected", "hidden")}
 
 
+def test_another_photograph_is_drawn_coarsely_at_once_and_sharply_once_it_is_still(browser: Browser, solved: Path):
+    context = browser.new_context(device_scale_factor=2)
+    with opened(context.new_page(), solved) as tab:
+        tab.locator(".tile").first.click()
+        idle(tab)
+        inspect(tab)
+        tab.wait_for_function("() => workbench.stage.drawing.dense === 2")
+        tab.evaluate("""() => {
+            const { stage } = workbench, paint = stage.paint.bind(stage);
+            globalThis.drawn = [];
+            stage.paint = () => {
+                paint();
+                const { dense, canvas } = stage.drawing;
+                if (!stage.waits()) drawn.push([workbench.frame, dense, canvas.width / stage.boxWidth]);
+            };
+        }""")
+        tab.locator("#canvas").focus()
+        tab.keyboard.press("ArrowLeft")
+        tab.wait_for_function(f"() => drawn.some(([frame, dense]) => frame === {FRAME - 1} && dense === 2)")
+        found = [[dense, wide] for frame, dense, wide in tab.evaluate("drawn") if frame == FRAME - 1]
+        margins = 1.24  # of the stage are drawn
+        assert found[0] == [1, pytest.approx(margins, abs=0.01)]
+        assert found[-1] == [2, pytest.approx(2 * margins, abs=0.01)]
+        count = tab.evaluate("workbench.stage.drawn")
+        tab.wait_for_timeout(700.0)
+        assert tab.evaluate("workbench.stage.drawn") <= count + 1  # nothing is drawn again and again
+    context.close()
+
+
 def test_a_chosen_rod_shows_its_track(tab: Page):
     rods = tab.evaluate("workbench.step.rodsOfFrame()")
     card = tab.locator("#card")
@@ -226,10 +255,10 @@ def test_a_chosen_rod_shows_its_track(tab: Page):
 
 def test_the_mask_is_a_layer_of_the_photographs(tab: Page):
     go(tab, "photographs")
-    tab.wait_for_function("workbench.stage.image !== null")
+    tab.wait_for_function("() => workbench.stage.image !== null")
     tab.evaluate("workbench.change('set_photographs', { region: [0, 400, 100, 500] })")
     idle(tab)
-    tab.wait_for_function("workbench.stage.image !== null")
+    tab.wait_for_function("() => workbench.stage.image !== null")
     masked, whole = shown(tab, photograph=True, mask=True), shown(tab, photograph=True)
     assert masked.astype(float).sum() < 0.8 * whole.astype(float).sum()
 

@@ -197,6 +197,24 @@ def test_what_is_in_the_middle_stays_there_when_the_window_gets_smaller(page: Pa
         assert middle == pytest.approx([300, 200], abs=1.0)
 
 
+def test_an_experiment_that_is_opened_is_shown_whole_whatever_was_enlarged_before(page: Page, solved: Path):
+    with opened(page, solved) as tab:
+        tab.locator(".tile").first.click()
+        idle(tab)
+        tab.evaluate("workbench.stage.centre(300, 200, 6)")
+        idle(tab)
+        tab.click("#brand")
+        idle(tab)
+        tab.locator(".tile").first.click()  # its photographs have the size of those before
+        idle(tab)
+        tab.wait_for_function("() => workbench.stage.isFitted()")
+        left, top, right, bottom = tab.evaluate("workbench.stage.visible()")
+        width, height = tab.evaluate("[workbench.project.width, workbench.project.height]")
+        assert max(left, top) < 0.0
+        assert right > width
+        assert bottom > height
+
+
 def test_a_window_that_changes_while_the_first_photograph_loads_shows_the_whole_of_it(page: Page, solved: Path):
     with opened(page, solved) as tab:
         waiting = []
