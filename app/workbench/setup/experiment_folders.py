@@ -72,7 +72,8 @@ def find_image_series(root: Path) -> list[ImageSeries]:
 def experiment_place(series: ImageSeries, root: Path) -> tuple[Path, str, str]:
     """Return folder, pattern of photographs and name of the experiment that a series is made into."""
     folder = series.folder
-    beside = [each for each in find_image_series(root) if each.folder.parent == folder.parent and each.folder != folder]
+    series_beside = [each.folder for each in find_image_series(root) if each.folder.parent == folder.parent]
+    beside = {*series_beside, *(each for each in _listed(folder.parent) if _is_file(each / CONFIG_NAME))} - {folder}
     if folder == root or beside or (folder.parent / CONFIG_NAME).is_file():
         return folder, f"*{series.suffix}", valid_name(folder.name)
     return folder.parent, f"{folder.name}/*{series.suffix}", valid_name(folder.parent.name)
