@@ -16,7 +16,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from ..process.errors import RunError
-from ..process.kernel_cache import kernel_folder
+from ..process.kernel_cache import has_shipped_kernels, kernel_folder
 from ..process.lock import hold_folder
 from ..process.progress import Progress, no_progress
 from ..process.sources import APP
@@ -65,7 +65,7 @@ class KernelsAhead:
             yield
             return
         done = folder / _name_of_mark([*parts, *(["all uses"] if all_uses else [])])
-        if done.exists():
+        if done.exists() or has_shipped_kernels():
             self.is_complete = True
             yield
             return

@@ -52,7 +52,9 @@ def choose_kernel_cache() -> None:
         folder = parent / f"{PREFIX}{key}"
         if _make_private(folder):
             _set(CACHE_VARIABLE, "CACHE_DIR", str(folder))
-            unpack_shipped(APP / SHIPPED / archive_name(key), folder)
+            archive = APP / SHIPPED / archive_name(key)
+            if archive.is_file() and not _unpacked_mark(folder).exists():
+                _UnpackBeforeCompiler(archive, folder).wait()
             _note_use(folder)
             return
 
@@ -68,6 +70,11 @@ def kernel_key() -> str:
 def archive_name(key: str) -> str:
     """Return the name of a wheel's archive of kernels with this key."""
     return f"{key}.zip"
+
+
+def has_shipped_kernels() -> bool:
+    """Whether a wheel brought all kernels for these sources, this compiler and this processor."""
+    return (APP / SHIPPED / archive_name(kernel_key())).is_file()
 
 
 def kernel_folder() -> Path | None:
@@ -86,12 +93,7 @@ def folder_of_sources(source: str) -> str:
 
 
 def unpack_shipped(archive: Path, folder: Path) -> None:
-    """Unpack a wheel's archive of kernels, once for each place where the package is installed."""
-    if not archive.is_file():
-        return
-    done = folder / f"unpacked-{hashlib.sha256(str(APP).encode()).hexdigest()[:KEY_LENGTH]}"
-    if done.exists():
-        return
+    """Unpack a wheel's archive of kernels into the folders of the place where the package is installed."""
     import tempfile  # most starts need no temporary folder
     import zipfile
 
@@ -106,7 +108,32 @@ def unpack_shipped(archive: Path, folder: Path) -> None:
             target.mkdir(exist_ok=True)
             (Path(part) / file).write_bytes(kernels.read(name))
             os.replace(Path(part) / file, target / file)
-        done.touch()
+        _unpacked_mark(folder).touch()
+
+
+class _UnpackBeforeCompiler:
+    """A finder of modules that unpacks a wheel's kernels when the compiler is imported: many commands never do."""
+
+    def __init__(self, archive: Path, folder: Path) -> None:
+        self._archive, self._folder = archive, folder
+
+    def wait(self) -> None:
+        """Unpack at once where the compiler is imported already, else when it is."""
+        if "numba" in sys.modules:
+            unpack_shipped(self._archive, self._folder)
+        else:
+            sys.meta_path.insert(0, self)
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
+        """Find nothing, as other finders do that do not know a module."""
+        if name == "numba":
+            sys.meta_path.remove(self)
+            unpack_shipped(self._archive, self._folder)
+
+
+def _unpacked_mark(folder: Path) -> Path:
+    """Return the file that states that the kernels of this installation are unpacked."""
+    return folder / f"unpacked-{hashlib.sha256(str(APP).encode()).hexdigest()[:KEY_LENGTH]}"
 
 
 def _choose_processor() -> None:

@@ -95,6 +95,13 @@ def one_worker():
     return first
 
 
+def test_no_process_is_started_where_a_wheel_brought_the_kernels(folder, monkeypatch):
+    log = use(monkeypatch, folder, COMPILES)
+    monkeypatch.setattr(ahead, "has_shipped_kernels", lambda: True)
+    assert compile_all().is_complete
+    assert given(log) == []
+
+
 def test_a_wheel_gets_the_kernels_of_all_uses(folder, monkeypatch):
     log = use(monkeypatch, folder, COMPILES)
     assert compile_all(all_uses=True).is_complete

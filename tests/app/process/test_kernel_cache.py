@@ -9,7 +9,9 @@ import subprocess
 import sys
 import time
 import zipfile
+from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -207,6 +209,8 @@ def test_a_compiler_that_has_begun_for_this_processor_keeps_to_it(monkeypatch, t
 def shipped(tmp_path, monkeypatch, new_process) -> Path:
     """A wheel's archive with one kernel of this program."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    imported = SimpleNamespace(config=SimpleNamespace(), __spec__=find_spec("numba"))
+    monkeypatch.setitem(sys.modules, "numba", imported)
     monkeypatch.setattr(kernel_cache, "SHIPPED", str(tmp_path))  # an absolute path replaces the package's folder
     archive = tmp_path / archive_name(kernel_key())
     with zipfile.ZipFile(archive, "w") as kernels:
@@ -224,6 +228,18 @@ def test_kernels_of_the_wheel_are_unpacked_once(shipped):
     unpacked().write_bytes(b"with a kernel compiled since")
     choose_kernel_cache()
     assert unpacked().read_bytes() == b"with a kernel compiled since"
+
+
+def test_kernels_of_the_wheel_are_unpacked_when_the_compiler_is_imported(shipped, monkeypatch):
+    monkeypatch.delitem(sys.modules, "numba")
+    monkeypatch.setattr(sys, "meta_path", list(sys.meta_path))
+    choose_kernel_cache()
+    finder, *_ = sys.meta_path
+    assert finder.find_spec("numpy") is None
+    assert not unpacked().exists()
+    assert finder.find_spec("numba") is None
+    assert unpacked().read_bytes() == b"shipped"
+    assert finder not in sys.meta_path
 
 
 def test_kernels_of_other_sources_than_the_installed_ones_are_not_used(shipped, monkeypatch):
