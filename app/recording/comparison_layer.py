@@ -52,7 +52,7 @@ def record_comparison(comparison: Comparison, path: Path | str, *, scale: Scale 
     """Write a comparison as a recording and return its size [bytes]."""
     path, base = Path(path), comparison.base
     tracks = tracks_in_cell(base.tracks, base.walls)
-    canvas = Canvas.around(tracks, scale)
+    canvas = Canvas.around(tracks, scale, None, base.walls)
     scene = Scene(
         f"{comparison.first.name} and {comparison.second.name}", tracks, base.walls, base.grains, base.friction,
         base.configuration, canvas, ForceStyle.on(canvas, _range_of(comparison)),

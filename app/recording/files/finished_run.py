@@ -127,7 +127,7 @@ def write_recording(
     _check_free_space(path.parent, survey.contact_count, sweeps, max_size)
     first = photograph(0) if photograph else None
     tracks = tracks_in_cell(results.tracks, results.walls)
-    canvas = Canvas.around(tracks, scale, None if first is None else first.shape)
+    canvas = Canvas.around(tracks, scale, None if first is None else first.shape, results.walls)
     camera = "" if results.lens is None else results.lens.describe_terms()
     scene = Scene(
         results.name, tracks, results.walls, results.grains, results.friction, results.configuration, canvas,

@@ -93,7 +93,8 @@ class LiveRecording:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         stream = rr.RecordingStream(entities.APPLICATION_ID, batcher_config=BATCHES)
         first = self._photograph(0) if self._photograph else None
-        canvas = Canvas.around(run.tracks, self._scale, None if first is None else first.shape)
+        shape = None if first is None else first.shape
+        canvas = Canvas.around(run.tracks, self._scale, shape, run.walls)
         self._canvas = canvas
         blueprint = make_blueprint(self._layout(run, canvas), following=True)
         self._written = self._open.enter_context(writing(stream, self.path, blueprint))

@@ -11,10 +11,13 @@ import numpy as np
 from ...experiment.jpeg_photographs import shrink_factor
 from ...experiment.units import Scale
 from ...solver.bodies.grains import Array
-from ...tracks import Tracks
+from ...solver.bodies.wall_shapes import IN
+from ...tracks import Tracks, WallTracks
 
 NOMINAL_RADIUS = 30.0  # px, of the mean grain, where there is no photograph
 BLOCK = 64  # frames whose bounds are found at a time
+MARGIN = 2.2, 0.5  # [grain radii] around centres of grains, and around a ring
+WIDEST = 2.5  # of the grains' extent: a larger ring is not shown whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,14 +30,20 @@ class Canvas:
     scale: Scale
     shrink: int  # 1, or 2 where photographs are recorded at half size
     grain_radius: float  # [px] of the mean grain
-    left: float  # [px] bounds of the grains in all frames
+    left: float  # [px] bounds of the grains, and of rings around them, in all frames
     top: float
     right: float
     bottom: float
 
     @classmethod
-    def around(cls, tracks: Tracks, scale: Scale | None, photograph_shape: tuple[int, int] | None = None) -> Canvas:
-        """Fit the canvas to every pose of every grain; raise ValueError if there is none."""
+    def around(
+        cls,
+        tracks: Tracks,
+        scale: Scale | None,
+        photograph_shape: tuple[int, int] | None = None,
+        walls: WallTracks | None = None,
+    ) -> Canvas:
+        """Fit the canvas to every pose of every grain and to rings around them; raise ValueError if there is none."""
         mean_radius = float(np.mean(tracks.radius))
         if scale is None:
             pixel_size = mean_radius / NOMINAL_RADIUS
@@ -48,10 +57,14 @@ class Canvas:
             ends.append((pixels.min(axis=0), pixels.max(axis=0)))
         if not ends:
             raise ValueError("no grain has a pose in any frame: there is nothing to draw")
-        margin = 2.2 * radius
-        left, top = np.min([low for low, _ in ends], axis=0) - margin
-        right, bottom = np.max([high for _, high in ends], axis=0) + margin
-        return cls(scale, shrink, radius, float(left), float(top), float(right), float(bottom))
+        low, high = np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0)
+        ring = (scale.to_pixels(_rings(walls)) + 0.5) / shrink
+        widest = WIDEST * float((high - low).max())
+        low, high = low - MARGIN[0] * radius, high + MARGIN[0] * radius
+        if len(ring) and float(np.ptp(ring, axis=0).max()) < widest:
+            low = np.minimum(low, ring.min(axis=0) - MARGIN[1] * radius)
+            high = np.maximum(high, ring.max(axis=0) + MARGIN[1] * radius)
+        return cls(scale, shrink, radius, *low.tolist(), *high.tolist())
 
     def points(self, world: Array) -> Array:
         """Convert points (…, 2) from [m] to [px]."""
@@ -86,6 +99,16 @@ class Canvas:
         Few distinct widths keep the recording small; multiples of a power of two are exact in float32.
         """
         return 2.0 ** round(math.log2(self.grain_radius / 120.0))
+
+
+def _rings(walls: WallTracks | None) -> Array:
+    """Corners (k, 2) [m] of the squares around circular walls with the packing inside."""
+    if walls is None or walls.centre is None or walls.radius is None:
+        return np.empty((0, 2))
+    around = walls.sides == IN
+    centre, radius = walls.centre[:, around], walls.radius[:, around, None]
+    corners = np.concatenate([centre - radius, centre + radius]).reshape(-1, 2)
+    return corners[np.isfinite(corners).all(axis=1)]
 
 
 def _places(tracks: Tracks) -> Iterator[Array]:

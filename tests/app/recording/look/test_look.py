@@ -24,6 +24,8 @@ from rodsight.recording.look.colours import (
 )
 from rodsight.recording.look.force_style import ForceStyle
 from rodsight.recording.packing_layers.forces.network import SweepChoice, chosen_sweeps, visible_sweeps
+from rodsight.solver.bodies.wall_shapes import IN
+from rodsight.tracks import WallTracks
 
 from tests.app.recording.fake_results import RADIUS, make_results
 
@@ -88,6 +90,23 @@ def test_the_quantum_is_a_quarter_pixel_for_the_nominal_grain():
     canvas = Canvas.around(make_results(1).tracks, None)
     assert canvas.grain_radius == pytest.approx(NOMINAL_RADIUS)
     assert canvas.quantum == 0.25
+
+
+@pytest.mark.parametrize(("wide", "whole"), [(1.0, True), (9.0, False)])
+def test_a_ring_around_the_grains_is_within_the_canvas_unless_it_is_far_larger(wide, whole):
+    tracks = make_results(1).tracks
+    place = tracks.position[tracks.present]
+    radius = wide * float(np.ptp(place, axis=0).max())
+    ends = place.mean(axis=0) + radius * np.array([[-1.0, 0.0], [1.0, 0.0]])
+    ring = WallTracks(
+        ("drum",), np.tile(ends, (tracks.frame_count, 1, 1, 1)), np.array([np.nan]), side=np.full(1, IN, np.int8)
+    )
+    bare = Canvas.around(tracks, None)
+    canvas = Canvas.around(tracks, None, None, ring)
+    corners = bare.points(place.mean(axis=0) + radius * np.array([[-1.0, 1.0], [1.0, -1.0]]))
+    inside = canvas.left < corners[0, 0] < corners[1, 0] < canvas.right
+    assert (inside and canvas.top < corners[0, 1] < corners[1, 1] < canvas.bottom) == whole
+    assert (canvas == bare) != whole
 
 
 def test_points_coincide_with_the_photograph():
