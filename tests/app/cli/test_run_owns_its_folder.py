@@ -102,7 +102,7 @@ def test_a_refused_experiment_leaves_no_folder_behind(tracked, tmp_path):
     assert not (tmp_path / "deep").exists()
 
 
-@pytest.mark.screen  # several whole runs
+@pytest.mark.slow  # several whole runs
 def test_cut_off_runs_of_different_settings_do_not_mix_frames(tracked, tmp_path, monkeypatch):
     out, other = tmp_path / "out", ("--set", "material.friction=0.4")
     command = ("solve", tracked, "--out", out, *FEW)
@@ -201,7 +201,7 @@ def test_partial_files_of_a_stopped_run_are_removed_and_no_others(tracked, tmp_p
     assert (out / "mine.part").exists()
 
 
-@pytest.mark.screen  # several whole runs
+@pytest.mark.slow  # several whole runs
 def test_pieces_left_beside_complete_results_are_removed(tracked, tmp_path, monkeypatch):
     arguments = ("solve", tracked, "--out", tmp_path / "out", *FEW)
 

@@ -15,6 +15,7 @@ from tests.program import KEPT, REPORTING, RODSIGHT, ROOT, rodsight, wait_for_re
 
 FEW = ("--set", "solver.estimator=nlgs", "--set", "solver.sweeps=20000", "--sweeps", "none", "--quiet")
 ENDS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
+SENT_TO_A_RUN = [signal.SIGINT, signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.slow)]
 
 # A process that receives a signal while it imports a module.
 WHILE_IMPORTING = """
@@ -45,7 +46,7 @@ def wait_for_ever(common: None, item: int) -> None:
 
 
 @pytest.mark.screen
-@pytest.mark.parametrize("number", ENDS, ids=lambda number: number.name)
+@pytest.mark.parametrize("number", SENT_TO_A_RUN, ids=lambda number: number.name)
 def test_a_signal_ends_a_run_in_one_line_and_keeps_its_frames(tracked, tmp_path, number):
     out = tmp_path / "out"
     command = [*REPORTING, "solve", str(tracked), "--out", str(out), *FEW]

@@ -142,7 +142,7 @@ def test_a_design_divides_the_variance(made_tracks, tmp_path, capsys):
     assert (out / "sensitivity.csv").read_text().splitlines()[0].startswith("friction,kappa,")
 
 
-@pytest.mark.screen
+@pytest.mark.slow
 def test_two_workers_give_the_results_of_one(nominal, tmp_path):
     cases = [KAPPA, FRICTION, Case((("position_noise", 1.0),), seed=4)]
     one = run_study(nominal, cases, EffectLog(tmp_path / "one.jsonl", "x"))

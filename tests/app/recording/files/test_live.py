@@ -149,7 +149,10 @@ def test_a_run_that_solves_nothing_leaves_no_process_and_no_recording(tmp_path):
 
 
 @pytest.mark.screen
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda number: number.name)
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow), signal.SIGKILL],
+    ids=lambda number: number.name,
+)  # fmt: skip
 def test_a_run_that_is_stopped_leaves_a_recording_that_opens_and_no_server(tracked, tmp_path, number):
     out = tmp_path / "out"
     command = [*REPORTING, "run", str(tracked), "--out", str(out), "--view", "web", "--set", "solver.sweeps=20000"]
