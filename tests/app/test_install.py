@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -83,6 +84,11 @@ def test_the_wheel_holds_the_package_its_data_and_no_tests(wheel):
 
 def test_the_first_run_of_the_wheel_compiles_nothing(wheel, tmp_path):
     assert run_first(wheel, tmp_path).compilations == 0
+    (archive,) = (wheel / "rodsight/shipped_kernels").iterdir()
+    with zipfile.ZipFile(archive) as content:
+        brought = sum(name.endswith(".nbc") for name in content.namelist())
+    assert len(list(tmp_path.rglob("*.nbc"))) == brought  # nor does any process that the run starts
+    assert list(tmp_path.rglob("compiled-*")) == []  # which none does
 
 
 def test_a_wheel_without_kernels_fits_every_system_and_one_with_kernels_its_own(wheel):
