@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from PIL import Image
 from playwright.sync_api import Page, expect
 from rodsight.workbench.setup.draft import Draft
 
@@ -64,3 +65,22 @@ def test_photographs_are_dragged_left_out_and_used_again(page: Page, begun: Path
         tab.wait_for_function(
             "(high) => workbench.stage.image && workbench.stage.wanted.includes('rotation=90')", arg=wide
         )
+
+
+def test_a_photograph_of_another_size_and_two_photographs_alone_are_named(page: Page, begun: Path):
+    file = begun / "my photographs" / "pictures" / NAMES[2]
+    with Image.open(file) as picture:
+        smaller = picture.resize((picture.width // 2, picture.height // 2))
+    smaller.save(file)
+    with opened(page, begun) as tab:
+        tab.locator(".tile").first.click()
+        idle(tab)
+        go(tab, "photographs")
+        stated = tab.locator("#panel .messages").first
+        expect(stated).to_contain_text(f"Photograph 2, {NAMES[2]}, is {smaller.width} x {smaller.height} pixels")
+        for row in (2, 2):
+            tab.locator("#order button").nth(row).click()
+            tab.click("#leave-out")
+            idle(tab)
+        assert tab.evaluate("workbench.project.files") == NAMES[:2]
+        expect(stated).to_contain_text("There are 2 photographs: friction is mobilised over several")
