@@ -238,6 +238,7 @@ def test_without_bearing_pairs_no_scale_is_drawn(case):
     assert one.random() == two.random()
 
 
+@pytest.mark.thorough
 def test_sweeps_follow_the_schedule_and_only_the_last_are_summed(case):
     looser = case.model._replace(balance_sd=0.9, gap_law_sd=0.05)
     models, kept = [looser, looser, case.model, case.model, case.model], 2

@@ -131,8 +131,9 @@ export class Stage {
 
   paint() {
     const { view, drawing } = this, dense = devicePixelRatio || 1, by = drawing.view ? view.k / drawing.view.k : 0;
-    const anew = drawing.stale || by < MAGNIFICATION[0] || by > MAGNIFICATION[1];
-    if (anew) this.renew(drawing.coarse ? Math.min(dense, 1) : dense);
+    const stretched = by < MAGNIFICATION[0] || by > MAGNIFICATION[1], anew = drawing.stale || stretched;
+    // What only the movement has stretched will soon be drawn again, sharply, once the view is still.
+    if (anew) this.renew(drawing.coarse || !drawing.stale ? Math.min(dense, 1) : dense);
     this.picture.place(view, this.width, this.height, dense, this.dim ?? 1);
     moveTo(drawing.canvas, (drawing.left - view.x) * view.k, (drawing.top - view.y) * view.k, view.k / drawing.view.k / drawing.dense);
     if (anew || this.loupe || this.cursor) this.paintFixed(dense);

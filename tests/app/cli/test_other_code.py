@@ -45,6 +45,7 @@ def other_code(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run_folder, "hash_of_code", lambda *_: "other")
 
 
+@pytest.mark.thorough
 def test_results_name_their_code_and_libraries(made_run):
     with h5py.File(made_run / "results.h5") as store:
         assert len(store.attrs["code"]) == 64

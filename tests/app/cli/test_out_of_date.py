@@ -59,6 +59,7 @@ def test_a_finished_run_is_up_to_date_also_with_settings_of_the_command_line(roo
     assert json.loads((root / "runs" / "tracked" / "summary.json").read_text())["out_of_date"] == []
 
 
+@pytest.mark.thorough
 def test_comments_change_nothing(root):
     file = root / "tracked" / "experiment.toml"
     file.write_text("# a comment\n" + file.read_text())

@@ -9,6 +9,7 @@ from rodsight.exchange.contact_graph import make_graph, write_graphs
 networkx = pytest.importorskip("networkx")
 
 
+@pytest.mark.thorough
 def test_the_file_contains_the_same_graph(with_a_loss, tmp_path):
     files = write_graphs(with_a_loss, tmp_path)
     assert len(files) == len(with_a_loss.frames)

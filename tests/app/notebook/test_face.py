@@ -60,6 +60,7 @@ def test_a_run_in_python_writes_the_same_files_as_the_command(made_tracks, run, 
     pd.testing.assert_frame_equal(run.contacts(), rodsight.open(tmp_path / "run").contacts())
 
 
+@pytest.mark.thorough
 def test_results_are_read_on_first_access(run):
     assert "results" not in vars(rodsight.open(run.file))
 

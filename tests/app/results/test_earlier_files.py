@@ -29,6 +29,8 @@ from tests.golden.stored import SCHEMAS, unpack
 ESSENTIAL = [each.path for each in entries() if each.quantity.essential]
 OTHERS = [each.path for each in entries() if not each.quantity.essential]
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
@@ -140,7 +142,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Results:
     return load_results(save_new(tmp_path_factory.mktemp("whole")))
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize(
     "path", [pytest.param(path, marks=pytest.mark.slow) if k % 12 else path for k, path in enumerate(OTHERS)]
 )
@@ -158,7 +159,6 @@ def test_without_a_dataset_that_is_not_essential_a_file_opens(path, new_file, wh
         assert np.array_equal(values, [kept.absent] * len(part), equal_nan=True)
 
 
-@pytest.mark.thorough
 def test_a_file_of_nothing_but_essentials_opens_records_and_exports(new_file, tmp_path):
     with h5py.File(new_file, "a") as store:
         for path in OTHERS:

@@ -30,6 +30,8 @@ FIRST = 2  # the photograph of the stored run's frame 0
 FRAME = 1
 SHOWN = FIRST + FRAME  # the photograph of that frame
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture
 def solved(visitor, photographs_only):
@@ -119,7 +121,6 @@ def test_a_verdict_reaches_the_solver_and_is_undone(solved):
     assert decided.count == 0
 
 
-@pytest.mark.thorough
 def test_a_verdict_stays_with_its_photograph_when_the_order_changes(solved):
     visitor, at, _, folder = solved
     names = visitor.request("project", at=at)["series"]["names"]
@@ -172,7 +173,6 @@ def test_forces_without_a_contact_differ_and_nothing_is_written(solved):
     assert "no contact" in visitor.refused("without_contact", at=at, frame=SHOWN, i=pair["i"], j=pair["i"])
 
 
-@pytest.mark.thorough
 def test_reviewers_are_compared_with_each_other_and_with_the_detector(solved):
     visitor, at, _, _ = solved
     assert visitor.request("agreement", at=at) == {
@@ -206,7 +206,6 @@ def test_reviewers_are_compared_with_each_other_and_with_the_detector(solved):
     assert pair["verdicts"] == {"anna": "contact", "ben": "no contact"}
 
 
-@pytest.mark.thorough
 def test_a_run_of_some_photographs_is_shown_over_those(solved):
     visitor, at, results, _ = solved
     answer = visitor.request("network", at=at, frame=FIRST)
@@ -248,7 +247,6 @@ def test_accounts_of_machines_name_no_reviewer(visitor, monkeypatch):
         assert visitor.request("reviewer")["name"] == name
 
 
-@pytest.mark.thorough
 def test_a_run_that_removes_its_pieces_meanwhile_is_no_error(solved, monkeypatch):
     visitor, at, results, folder = solved
     pieces = folder / UNFINISHED / "solving"
@@ -344,7 +342,6 @@ def test_the_folder_that_is_opened_is_duplicated_below_itself(visitor, photograp
     assert not (folder / second["at"] / first["at"]).exists()
 
 
-@pytest.mark.thorough
 def test_the_motion_of_rods_is_that_of_their_tracks(solved):
     visitor, at, results, _ = solved
     tracks, last = results.tracks, FIRST + len(results.frames) - 1
@@ -363,7 +360,6 @@ def test_the_motion_of_rods_is_that_of_their_tracks(solved):
     assert "is not solved" in visitor.refused("motion", at=at, frame=last, since=FIRST - 1)
 
 
-@pytest.mark.thorough
 def test_the_motion_over_the_window_is_that_of_the_results(solved):
     visitor, at, results, folder = solved
     tracks, last = results.tracks, FIRST + len(results.frames) - 1
@@ -381,7 +377,6 @@ def test_the_motion_over_the_window_is_that_of_the_results(solved):
     np.testing.assert_allclose(moved, measured.fluctuation[-1, here], rtol=0.02, atol=2e-6)
 
 
-@pytest.mark.thorough
 def test_fringes_are_values_of_the_discs_where_the_run_has_them(solved):
     visitor, at, results, folder = solved
     last = FIRST + len(results.frames) - 1
@@ -396,7 +391,6 @@ def test_fringes_are_values_of_the_discs_where_the_run_has_them(solved):
         np.testing.assert_allclose(np.array(answer[name], float), values[-1, here] / found.mean, rtol=2e-3, atol=1e-4)
 
 
-@pytest.mark.thorough
 def test_candidate_pairs_are_those_of_their_photograph(solved):
     visitor, at, results, _ = solved
     for frame in range(len(results.frames)):

@@ -232,6 +232,11 @@ def test_another_photograph_is_drawn_coarsely_at_once_and_sharply_once_it_is_sti
         count = tab.evaluate("workbench.stage.drawn")
         tab.wait_for_timeout(700.0)
         assert tab.evaluate("workbench.stage.drawn") <= count + 1  # nothing is drawn again and again
+        tab.evaluate(
+            "() => { drawn.length = 0; workbench.stage.zoom(3); }"
+        )  # more than a former drawing is enlarged by
+        tab.wait_for_function("() => drawn.some(([, dense]) => dense === 2)")
+        assert tab.evaluate("drawn[0]")[1] == 1
     context.close()
 
 

@@ -44,6 +44,7 @@ def hide(monkeypatch: pytest.MonkeyPatch, key: int) -> None:
     monkeypatch.setattr(RefinedBlock, "contacts_at", incomplete)
 
 
+@pytest.mark.thorough
 def test_a_missed_strong_contact_is_recovered_and_reported(sound, monkeypatch):
     key = strongest(sound[FRAME])
     hide(monkeypatch, key)

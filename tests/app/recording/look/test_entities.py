@@ -17,6 +17,8 @@ from rodsight.tracks import TrackStatus
 from tests.app.recording.fake_results import make_results
 from tests.app.recording.rows import components, latest, rows
 
+pytestmark = pytest.mark.thorough
+
 
 def expected(*absent: Condition) -> dict[str, tuple[set[str], set[str]]]:
     return {
