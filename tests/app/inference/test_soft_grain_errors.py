@@ -73,7 +73,7 @@ def test_exact_radii_stay_as_stated(tmp_path):
     assert correct_soft_grains(hard) is hard
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_preliminary_solution_stops_where_the_first_frames_show_no_errors(tmp_path, monkeypatch):
     solved = []
 

@@ -10,11 +10,12 @@ import pytest
 import rodsight
 
 ERRORS = ("InputError", "RunError")
+SLOW = pytest.mark.slow  # a campaign in Python runs in a notebook's test and on a page, too
 NAMES = tuple(sorted(set(rodsight.__all__) - {"__version__", *ERRORS}))
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [pytest.param(each, marks=SLOW if each == "campaign" else ()) for each in NAMES])
 def test_examples_give_the_printed_output(name, examples, monkeypatch):
     monkeypatch.chdir(examples)
     documented = getattr(rodsight, name)

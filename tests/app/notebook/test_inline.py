@@ -46,7 +46,7 @@ def test_all_parts_of_a_recording_are_in_the_cell_unless_it_is_too_large(noteboo
     assert f"rodsight view {tmp_path}" in inline.show_recording(written.path)
 
 
-@pytest.mark.screen
+@pytest.mark.slow  # the page of `share --html` draws the same recording in the lane of browsers
 def test_the_recording_appears_in_a_frame_of_the_notebooks_page(notebook, page, tmp_path):
     results, scale = make_results(frame_count=4), Scale(PIXEL, SHAPE[0])
     path = write_recording(

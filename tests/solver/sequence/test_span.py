@@ -95,7 +95,7 @@ def test_a_frame_that_fails_costs_no_other(monkeypatch):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("first", [pytest.param(1, marks=pytest.mark.thorough), 4, 6])
+@pytest.mark.parametrize("first", [pytest.param(1, marks=pytest.mark.slow), 4, 6])
 def test_a_sequence_resumes_from_the_last_states_bit_for_bit(first):
     packing, snapshots = sheared_frames(FRAMES)
     whole = solve(THREE)
