@@ -73,14 +73,19 @@ def examine_rotations(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     if abs(rank) >= max(AGREES, SIGMAS / np.sqrt(max(len(stated), 1))):
         against = f"the rank correlation with the rotations expected from rolling is {rank:.2f}"
         ratio = float(np.median(np.abs(stated)) / max(float(np.median(np.abs(inferred))), 1e-300))
-        excess = f"rods rotate {ratio:.0f} times as much as rolling leads to expect"
-    else:
-        rank, error = _slope_of_turning(tracks)
-        if abs(rank) < max(TURNS, SIGMAS * error):
-            return []
-        against = f"rods rotate on average by {rank:.1f} times the rotation of the packing"
-        ratio, excess = rank, against
-    if rank < 0:
+        return _judge_rotations(
+            rank, against, ratio, f"rods rotate {ratio:.0f} times as much as rolling leads to expect"
+        )
+    slope, error = _slope_of_turning(tracks)
+    if abs(slope) < max(TURNS, SIGMAS * error):
+        return []
+    words = f"rods rotate on average by {slope:.1f} times the rotation of the packing"
+    return _judge_rotations(slope, words, slope, words)
+
+
+def _judge_rotations(sense: float, against: str, ratio: float, excess: str) -> list[Finding]:
+    """Name rotations of the wrong sense, negative, or those that are too large by a ratio, with their evidence."""
+    if sense < 0:
         return [finding("rotation_sign", against)]
     return [finding("rotation_in_degrees", excess)] if ratio > DEGREES else []
 
@@ -88,12 +93,12 @@ def examine_rotations(tracks: Tracks, walls: WallTracks) -> list[Finding]:
 def _slope_of_turning(tracks: Tracks) -> tuple[float, float]:
     """Slope of the rods' mean rotation over that of the packing, and its standard error; (0, inf): nothing turns."""
     spin, mean, error = [], [], []
-    for k in range(tracks.frame_count - 1):
-        moved, rotated = (each[k + 1] - each[k] for each in (tracks.position, tracks.rotation))
-        both = np.isfinite(moved).all(axis=1) & np.isfinite(rotated)
+    for k in range(1, tracks.frame_count):
+        rotated = tracks.rotation[k] - tracks.rotation[k - 1]
+        both = tracks.present_in(k - 1) & tracks.present_in(k) & np.isfinite(rotated)
         if both.sum() < FEWEST_TURNING:
             continue
-        gradient = displacement_gradient(tracks.position[k], np.where(both[:, None], moved, np.nan), both)
+        gradient = _gradient(tracks, k, both)
         spin.append(0.5 * float(gradient[1, 0] - gradient[0, 1]))
         mean.append(float(rotated[both].mean()))
         error.append(float(rotated[both].std()) / np.sqrt(both.sum()))
@@ -108,9 +113,12 @@ def _span(tracks: Tracks) -> int:
     """Fewest photographs over which the rods move enough among each other; of too little motion, those of the most."""
     sigma, most = float(np.nanmedian(tracks.position_sigma)), tracks.frame_count - 1
     spans = np.unique(np.minimum(2 ** np.arange(most.bit_length() + 1), most)).tolist() if most > 0 else [1]
-    moved = [_deformation(tracks, span) for span in spans]
-    enough = [span for span, each in zip(spans, moved, strict=True) if each >= SPAN_SIGMAS * sigma]
-    return enough[0] if enough else spans[int(np.argmax(moved))]
+    moved: list[float] = []
+    for span in spans:
+        moved.append(_deformation(tracks, span))
+        if moved[-1] >= SPAN_SIGMAS * sigma:
+            return span
+    return spans[int(np.argmax(moved))]
 
 
 def _deformation(tracks: Tracks, span: int) -> float:
@@ -293,10 +301,14 @@ def _shear_rate(tracks: Tracks, k: int) -> float:
     both, time = tracks.present_in(k - 1) & tracks.present_in(k), float(tracks.time[k] - tracks.time[k - 1])
     if int(both.sum()) < 4 or not time > 0.0:
         return np.nan
-    gradient = displacement_gradient(
-        tracks.position[k - 1], np.where(both[:, None], tracks.position[k] - tracks.position[k - 1], np.nan), both
-    )
+    gradient = _gradient(tracks, k, both)
     return shear_strain(0.5 * (gradient + gradient.T)) / time
+
+
+def _gradient(tracks: Tracks, k: int, both: NDArray[np.bool_]) -> Array:
+    """Displacement gradient (2, 2) of some rods (n,) from the photograph before to photograph k."""
+    moved = np.where(both[:, None], tracks.position[k] - tracks.position[k - 1], np.nan)
+    return displacement_gradient(tracks.position[k - 1], moved, both)
 
 
 def _distance(tracks: Tracks, k: int, other: int) -> float:

@@ -70,14 +70,14 @@ MUTANTS = [
     *mutants_of(
         "app/inference/diagnosis/direct_tests.py",
         f"{TESTS}/diagnosis/test_direct_tests.py",
-        ("if rank < 0:", "if rank > 2:"),
+        ("if sense < 0:", "if sense > 2:"),
         ("if ratio > DEGREES else", "if ratio > 1e3 else"),
         ("SHORTER * given", "2.0 * given"),
         ("still and (last < -allowed", "(last < -allowed"),
         ("max(REPEATED * usual, STILL * noise)", "REPEATED * usual"),
         ("max(AGREES, SIGMAS / np.sqrt(max(len(stated), 1)))", "0.0"),
-        ("abs(rank) < max(TURNS, SIGMAS * error)", "True"),
-        ("return enough[0] if enough", "return 1 if enough"),
+        ("abs(slope) < max(TURNS, SIGMAS * error)", "True"),
+        ("            return span\n", "            return 1\n"),
     ),
     *mutants_of(
         "app/inference/diagnosis/diagnose.py",

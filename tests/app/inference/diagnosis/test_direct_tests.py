@@ -7,6 +7,9 @@ import pytest
 from rodsight.inference.correction.outliers import find_outliers
 from rodsight.inference.correction.radii import find_wrong_sizes
 from rodsight.inference.diagnosis.direct_tests import (
+    SPAN_SIGMAS,
+    _deformation,
+    _span,
     examine_inertia,
     examine_order,
     examine_poses,
@@ -71,6 +74,14 @@ def test_rotations_that_noise_hides_from_one_photograph_to_the_next_are_compared
     small = 3.0 * NOISE / PITCH
     assert [each.cause for each in examine_rotations(with_rolling(-1.0, small), box())] == ["rotation_sign"]
     assert examine_rotations(with_rolling(1.0, small), box()) == []
+
+
+def test_a_step_leads_over_the_fewest_photographs_that_move_the_rods_enough():
+    moved = _deformation(rolling_tracks(1.0, 0.0), 1)
+    for span in (1, 2, 4):
+        assert _span(rolling_tracks(1.05 * SPAN_SIGMAS * NOISE / (span * moved))) == span
+    most = FRAMES - 1
+    assert _span(rolling_tracks(0.5 * SPAN_SIGMAS * NOISE / (most * moved))) == most
 
 
 @pytest.mark.parametrize(("factor", "cause"), [(1.0, None), (-1.0, "rotation_sign"), (57.3, "rotation_in_degrees")])
