@@ -75,18 +75,15 @@ def _least_radius(radius: Array) -> float:
 
 def _equidistant_points(centre: Array, radius: Array) -> Array:
     """Return points (h, 2) equidistant from three circles of centre (h, 3, 2) and radius (h, 3) (Newton's method)."""
-    point = centre.mean(axis=1)
+    # One row per circle and component: numpy is slow on axes of length two and three.
+    x, y, r = (np.ascontiguousarray(each.T) for each in (centre[..., 0], centre[..., 1], radius))
+    px, py = x.mean(axis=0), y.mean(axis=0)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         for _ in range(NEWTON_STEPS):
-            apart = point[:, None] - centre
-            distance = np.linalg.norm(apart, axis=2)
-            clearance = distance - radius
-            unit = apart / distance[:, :, None]
-            matrix = unit[:, 1:] - unit[:, :1]
-            residual = clearance[:, 1:] - clearance[:, :1]
-            pivot = matrix[:, 0, 0] * matrix[:, 1, 1] - matrix[:, 0, 1] * matrix[:, 1, 0]
-            point = point - np.stack([
-                (matrix[:, 1, 1] * residual[:, 0] - matrix[:, 0, 1] * residual[:, 1]) / pivot,
-                (matrix[:, 0, 0] * residual[:, 1] - matrix[:, 1, 0] * residual[:, 0]) / pivot,
-            ], axis=1)  # fmt: skip
-    return point
+            dx, dy = px - x, py - y
+            distance = np.sqrt(dx * dx + dy * dy)
+            clearance, dx, dy = distance - r, dx / distance, dy / distance
+            (ax, bx), (ay, by), (first, second) = dx[1:] - dx[0], dy[1:] - dy[0], clearance[1:] - clearance[0]
+            pivot = ax * by - ay * bx
+            px, py = px - (by * first - ay * second) / pivot, py - (ax * second - bx * first) / pivot
+    return np.column_stack([px, py])

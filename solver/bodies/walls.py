@@ -7,6 +7,7 @@ are the ends of a diameter that rotates with it, which give its centre, radius a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float, Int8, Int32
@@ -89,26 +90,7 @@ class Walls:
 
     def _overhang(self) -> Array:
         """Length of every segment that lies outside of the walls crossing it (w,) [m]."""
-        start, along, length = self.endpoints[:, 0], self.direction, self.length
-        straight = np.flatnonzero(~self.curved)
-        begin, end = np.zeros(self.count), length.copy()
-        for w in straight.tolist():
-            for v in straight.tolist():
-                crossing = along[v, 0] * along[w, 1] - along[v, 1] * along[w, 0]
-                if v == w or abs(crossing) < PARALLEL:
-                    continue
-                apart = start[w] - start[v]
-                here = -(along[v, 0] * apart[1] - along[v, 1] * apart[0]) / crossing  # [m] along w
-                there = (along[w, 1] * apart[0] - along[w, 0] * apart[1]) / crossing  # [m] along v
-                if not (0.0 < here < length[w] and abs(there / length[v] - 0.5) < 0.5 + BEYOND_END):
-                    continue
-                # the packing is to the left of v: towards the end of w, or towards its beginning
-                if crossing > 0.0:
-                    begin[w] = max(begin[w], here)
-                else:
-                    end[w] = min(end[w], here)
-        overhang = length - (end - begin)
-        return np.where((end > begin) & (overhang > NEGLIGIBLE_OVERHANG * length), overhang, 0.0)
+        return _overhang(self.endpoints.tobytes(), self.curved.tobytes())
 
     @property
     def centre(self) -> Array:
@@ -187,3 +169,31 @@ class Walls:
             rotated = np.stack([-(v1 - v0)[:, 1], (v1 - v0)[:, 0]], axis=1)
             velocity += np.where(self.curved[wall], offset, 0.0)[:, None] * rotated
         return velocity
+
+
+@lru_cache(maxsize=16)  # the walls of a frame are made many times
+def _overhang(endpoints: bytes, curved: bytes) -> Array:
+    """Length of every segment that lies outside of the walls crossing it (w,) [m]; of walls (w, 2, 2) [m] and (w,)."""
+    ends, count = np.frombuffer(endpoints).reshape(-1, 2, 2), len(curved)
+    start, vector = ends[:, 0], ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(vector, axis=1)
+    along = vector / length[:, None]
+    straight = np.flatnonzero(~np.frombuffer(curved, np.bool_))
+    begin, end = np.zeros(count), length.copy()
+    for w in straight.tolist():
+        for v in straight.tolist():
+            crossing = along[v, 0] * along[w, 1] - along[v, 1] * along[w, 0]
+            if v == w or abs(crossing) < PARALLEL:
+                continue
+            apart = start[w] - start[v]
+            here = -(along[v, 0] * apart[1] - along[v, 1] * apart[0]) / crossing  # [m] along w
+            there = (along[w, 1] * apart[0] - along[w, 0] * apart[1]) / crossing  # [m] along v
+            if not (0.0 < here < length[w] and abs(there / length[v] - 0.5) < 0.5 + BEYOND_END):
+                continue
+            # the packing is to the left of v: towards the end of w, or towards its beginning
+            if crossing > 0.0:
+                begin[w] = max(begin[w], here)
+            else:
+                end[w] = min(end[w], here)
+    overhang = length - (end - begin)
+    return np.where((end > begin) & (overhang > NEGLIGIBLE_OVERHANG * length), overhang, 0.0)

@@ -65,13 +65,18 @@ def find_rows(key: Keys, former: Keys) -> tuple[NDArray[np.intp], NDArray[np.boo
     """Return the row of every pair (c,) in a former set, and whether it is there; otherwise the row is arbitrary."""
     if len(former) == 0:
         return np.zeros(len(key), np.intp), np.zeros(len(key), np.bool_)
-    order = np.argsort(former, kind="stable")
-    row = order[np.minimum(np.searchsorted(former, key, sorter=order), len(former) - 1)]
+    if np.all(former[1:] > former[:-1]):
+        row = np.minimum(np.searchsorted(former, key), len(former) - 1)
+    else:
+        order = np.argsort(former, kind="stable")
+        row = order[np.minimum(np.searchsorted(former, key, sorter=order), len(former) - 1)]
     return row, former[row] == key
 
 
 def match_values(key: Keys, former: Keys, value: NDArray[Any], *, fill: float = 0.0) -> NDArray[Any]:
     """Return the values (c, …) of pairs from those of former pairs (m, …); `fill` where a pair is not among them."""
+    if np.array_equal(key, former):
+        return value.copy()
     row, known = find_rows(key, former)
     found = np.full((len(key), *value.shape[1:]), fill, value.dtype)
     found[known] = value[row[known]]

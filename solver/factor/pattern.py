@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import spilu
 
 Ids = NDArray[np.int64]
 
@@ -88,7 +88,11 @@ def find_pattern(node_count: int, a: Ids, b: Ids) -> Pattern:
 def _order_by_degree(graph) -> Ids:  # type: ignore[no-untyped-def]
     if graph.shape[0] == 0:
         return np.zeros(0, np.int64)
-    factor = splu(graph, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    # Only the order is wanted: an incomplete factorisation that drops everything takes half of the time of a whole one.
+    factor = spilu(
+        graph, drop_tol=1.0, fill_factor=1.0, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )  # fmt: skip
     return factor.perm_c.astype(np.int64)
 
 

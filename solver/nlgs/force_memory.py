@@ -32,6 +32,8 @@ class ForceMemory:
 
         A lost grain thus has its last forces when it is found again.
         """
+        if present.all():
+            return ForceMemory(contacts.key, np.array(force, order="C"))
         absent = ~are_present(self.key, present, contacts.body_count)
         key = np.concatenate([self.key[absent], contacts.key])
         order = np.argsort(key, kind="stable")

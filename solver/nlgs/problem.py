@@ -8,6 +8,7 @@ f₀ = σ L d: forces of κ f₀ cancel the whole measured motion. The rotationa
 
 from __future__ import annotations
 
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -192,7 +193,7 @@ def _inverse(value: Array) -> Array:
 
 def aligned_zeros(shape: tuple[int, ...], kind: type = np.float64) -> NDArray:
     """Allocate zeros aligned to a cache line, so that no vector crosses two lines."""
-    size = int(np.prod(shape)) * np.dtype(kind).itemsize
+    size = prod(shape) * np.dtype(kind).itemsize
     buffer = np.zeros(size + CACHE_LINE, np.uint8)
     start = -buffer.ctypes.data % CACHE_LINE
     return buffer[start : start + size].view(kind).reshape(shape)

@@ -190,7 +190,7 @@ def solve(
     if observer is None and not stopping:
         every = max(1, settings.sweeps)
     strides = _strides(every, settings.sweeps)
-    stop, number, force = Stop.SWEEPS, 0, _start(problem, guess)[0]
+    stop, number, force = Stop.SWEEPS, 0, None
     for sweep in sweeps(problem, settings, guess=guess, every=strides, measured=measured):
         force, number = sweep.force, sweep.number
         if observer is not None:
@@ -201,6 +201,8 @@ def solve(
         if settings.force_change is not None and sweep.force_change <= settings.force_change:
             stop = Stop.FORCE_CHANGE
             break
+    if force is None:  # no sweep was requested
+        force = _start(problem, guess)[0]
     return _finish(problem, force, stop, number)
 
 
