@@ -57,7 +57,12 @@ print(len(VerdictLog(log.file).entries()))
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(
-    "what", ["track", "check", "verdict", pytest.param("solve", marks=pytest.mark.screen)]
+    "what",
+    [
+        "track",
+        *(pytest.param(each, marks=pytest.mark.slow) for each in ("check", "verdict")),
+        pytest.param("solve", marks=pytest.mark.screen),
+    ],
 )  # solve compiles anew, without the number of cores
 def test_commands_need_nothing_that_only_unix_has(what, made_tracks, tmp_path):
     done = run(ABSENT + COMMANDS[what], made_tracks, tmp_path / "run")

@@ -117,7 +117,9 @@ def test_cut_off_runs_of_different_settings_do_not_mix_frames(tracked, tmp_path,
 
 
 @pytest.mark.screen  # several whole runs
-@pytest.mark.parametrize("piece", ["results.h5", ".unfinished/solving/000001.piece"])
+@pytest.mark.parametrize(
+    "piece", ["results.h5", pytest.param(".unfinished/solving/000001.piece", marks=pytest.mark.slow)]
+)
 def test_a_damaged_piece_is_reported_and_computed_again(tracked, tmp_path, monkeypatch, capsys, piece):
     out = tmp_path / "out"
     command = ("solve", tracked, "--out", out, *FEW[:-1])

@@ -53,7 +53,14 @@ def test_there_are_four_without_outputs_and_the_page_names_them():
 
 
 @pytest.mark.screen  # many seconds
-@pytest.mark.parametrize("file", FIRST_FIRST, ids=lambda file: file.stem)
+@pytest.mark.parametrize(
+    "file",
+    [
+        pytest.param(file, marks=[pytest.mark.slow] if file.stem == "study_of_a_parameter" else [])
+        for file in FIRST_FIRST
+    ],
+    ids=lambda file: file.stem,
+)
 def test_the_cells_of_a_notebook_run_on_a_small_experiment(file, small, monkeypatch, capsys):
     monkeypatch.chdir(small)
     mpl.use("agg")

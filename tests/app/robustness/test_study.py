@@ -150,7 +150,7 @@ def test_two_workers_give_the_results_of_one(nominal, tmp_path):
     assert one == two
 
 
-@pytest.mark.screen
+@pytest.mark.slow
 def test_ctrl_c_ends_the_study_and_the_same_command_resumes_it(made_tracks, tmp_path, capsys):
     out = tmp_path / "out"
     command = ("sensitivity", made_tracks, "--out", out, *SET, "--factors", "kappa=0.5:2", "sweeps=0.1:2000")

@@ -117,7 +117,7 @@ def test_a_card_names_its_run_and_shows_every_contact_grain_and_wall_of_the_last
         assert f"#{colour:08x}" in card
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_folder_of_runs_is_one_page_with_a_card_for_each_and_one_viewer(tmp_path, capsys):
     path = write_recording(make_results(1, sweeps=5), tmp_path / "run.rrd").path
     for name in ("first", "second", "damaged"):

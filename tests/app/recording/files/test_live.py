@@ -150,7 +150,8 @@ def test_a_run_that_solves_nothing_leaves_no_process_and_no_recording(tmp_path):
 
 @pytest.mark.screen
 @pytest.mark.parametrize(
-    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow), signal.SIGKILL],
+    "number",
+    [signal.SIGKILL, *(pytest.param(each, marks=pytest.mark.slow) for each in (signal.SIGINT, signal.SIGTERM))],
     ids=lambda number: number.name,
 )  # fmt: skip
 def test_a_run_that_is_stopped_leaves_a_recording_that_opens_and_no_server(tracked, tmp_path, number):

@@ -35,7 +35,7 @@ def test_pictures_of_tabs_and_views_at_any_time(recording):
 
 
 @needs_vulkan
-@pytest.mark.screen
+@pytest.mark.slow  # as the pictures of tabs and views, but for the menus
 def test_a_plain_picture_of_a_tab_has_no_menus_and_no_buttons(recording):
     size = (900, 600)
     with HeadlessViewer(recording.path, width=size[0], height=size[1], plain=True) as viewer:
