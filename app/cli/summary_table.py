@@ -70,7 +70,7 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
         for each in summary.get("diagnosis", [])
     ]
     lines += _sd_line(summary) + budget_lines(summary) + _penalty_line(summary)
-    lines += [_load_line(each) for each in summary.get("loads", [])]
+    lines += [load_line(each) for each in summary.get("loads", [])]
     scale = [each for each in summary.get("scale_sd", []) if each is not None]
     if scale:
         lines.append(f"Scale of all forces: standard deviation {100 * np.median(scale):.0f} % (median over frames).")
@@ -167,14 +167,16 @@ def budget_lines(summary: dict[str, Any]) -> list[str]:
     ]
 
 
-def _load_line(load: dict[str, Any]) -> str:
+def load_line(load: dict[str, Any]) -> str:
     """State the load on a wall in newtons, which sets the scale of the forces."""
     wall, force = escape(load["wall"]), load["force"]
+    rest = 1.0 - load.get("fraction_on_free_rods", 1.0)
+    told = f" Rods of the boundary bear {100.0 * rest:.0f} % of it, the others the rest." if rest > 0.0 else ""
     if load["pressure"] is None:
         low, high = load["range"]
-        return f"Load on '{wall}', measured: {force:.4g} N in the mean ({low:.4g} to {high:.4g} N)."
+        return f"Load on '{wall}', measured: {force:.4g} N in the mean ({low:.4g} to {high:.4g} N).{told}"
     parts = f"{load['pressure'] / 1e3:.4g} kPa × {load['width']:.4g} m × {load['length']:.3g} m"
-    return f"Load on '{wall}': {parts} = {force:.4g} N; it sets the scale of all forces."
+    return f"Load on '{wall}': {parts} = {force:.4g} N; it sets the scale of all forces.{told}"
 
 
 def _penalty_line(summary: dict[str, Any]) -> list[str]:

@@ -14,6 +14,7 @@ from jaxtyping import Float
 
 from ..process.atomic import write_atomically
 from ..solver.assessment.intervals.statistic_intervals import CONSTANT
+from ..solver.bodies.packing import fraction_on_free_grains
 from ..solver.bodies.walls import Walls
 from ..solver.frame_forces import ERROR_PARTS, FrameForces, FrameStatus
 from ..solver.statistics.agreement import Agreement
@@ -212,11 +213,14 @@ def _friction(results: Results) -> dict[str, Any] | None:
 def _loads(results: Results) -> list[dict[str, Any]]:
     """Return the load on every plate [N] with what it follows from; measured ones as mean and range."""
     walls, length, found = results.walls, _material(results).get("length"), []
-    width = Walls.at_rest(walls.endpoints[0], side=walls.side).face
+    first = Walls.at_rest(walls.endpoints[0], side=walls.side)
+    width = first.face
+    free = fraction_on_free_grains(results.grains, first, results.tracks.position[0], results.tracks.present[0])
     for w, name in enumerate(walls.name):
         measured = np.empty(0) if walls.load is None else walls.load[:, w][np.isfinite(walls.load[:, w])]
         pressure = float(walls.pressure[w])
         known: dict[str, Any] = {"wall": name, "width": float(width[w]), "length": length, "pressure": None}
+        known["fraction_on_free_rods"] = float(free[w])
         if len(measured):
             limits = [float(measured.min()), float(measured.max())]
             found.append(known | {"force": float(measured.mean()), "range": limits})

@@ -15,6 +15,7 @@ from .wall_shapes import Sides
 from .walls import Walls
 
 EXACT = 1e-12  # [m] floor of a displacement
+NEAR = 0.1  # gap of a grain at a wall, over its radius, up to which it may bear part of the load
 BASE_ARM = 2.0 / 3.0  # of a radius: greatest moment of a base over its friction, for a uniform pressure
 
 
@@ -87,10 +88,16 @@ class Packing:
         plates = np.isfinite(self.pressure)
         if snapshot.load is None or not plates.any():
             return float(self.pressure[plates].mean()) if plates.any() else 0.0
-        walls = self.walls_of(snapshot)
+        walls = self.walls(snapshot.endpoints, snapshot.side, snapshot.load)
         return float((walls.load[plates] / (walls.face[plates] * self.length)).mean())
 
-    def load(self, endpoints: Array, side: Sides = None, measured: Array | None = None) -> Array:
+    def load(
+        self,
+        endpoints: Array,
+        side: Sides = None,
+        measured: Array | None = None,
+        placed: tuple[Array, NDArray[np.bool_]] | None = None,
+    ) -> Array:
         """Return the load on every wall (w,) [N], NaN where the motion is imposed.
 
         Parameters
@@ -101,9 +108,19 @@ class Packing:
             Shapes of the walls.
         measured : (w,), optional
             Measured loads [N], used instead of the pressure; NaN: not measured.
+        placed : (n, 2) and (n,), optional
+            Centres [m] and presence of the grains, of which those of the boundary bear a part that is left out.
+
+        Notes
+        -----
+        Forces between a boundary grain and a wall are not part of the model, as the motion of both is given: see
+        `fraction_on_free_grains`.
         """
         pressed = self.pressure * Walls.at_rest(endpoints, side=side).face * self.length
-        return pressed if measured is None else np.where(np.isfinite(measured), measured, pressed)
+        load = pressed if measured is None else np.where(np.isfinite(measured), measured, pressed)
+        if placed is None:
+            return load
+        return load * fraction_on_free_grains(self.grains, Walls.at_rest(endpoints, side=side), *placed)
 
     def walls(self, endpoints: Array, side: Sides = None, measured: Array | None = None) -> Walls:
         """Return the walls of endpoints (w, 2, 2) [m] at rest under their loads; arguments as of `load`."""
@@ -111,5 +128,34 @@ class Packing:
 
     def walls_of(self, snapshot: Snapshot) -> Walls:
         """Return the walls of a snapshot at rest under their loads."""
-        load = self.load(snapshot.endpoints, snapshot.side, snapshot.load)
+        placed = snapshot.position, snapshot.present
+        load = self.load(snapshot.endpoints, snapshot.side, snapshot.load, placed)
         return Walls.at_rest(snapshot.endpoints, load, snapshot.side, snapshot.cell, snapshot.plate)
+
+
+def fraction_on_free_grains(grains: Grains, walls: Walls, position: Array, present: NDArray[np.bool_]) -> Array:
+    """Return the fraction of the load on every wall (w,) that free grains bear; 1 where none is at the wall.
+
+    Parameters
+    ----------
+    grains : Grains
+    walls : Walls
+    position : (n, 2)
+        Centres [m].
+    present : (n,)
+        Which grains are there.
+
+    Notes
+    -----
+    Σ R of the free grains at the wall over Σ R of all: each bears the load on its width.
+    """
+    fraction = np.ones(walls.count)
+    if grains.boundary is None:
+        return fraction
+    position, radius, free = position[present], grains.radius[present], grains.free[present]
+    for w in range(walls.count):
+        distance, _ = walls.distance(np.full(len(radius), w), position)
+        width = radius * (np.abs(distance - radius) < NEAR * radius)
+        if (width @ free) > 0.0:
+            fraction[w] = float(width @ free) / float(width.sum())
+    return fraction

@@ -44,7 +44,9 @@ class Interval:
     def __init__(self, packing: Packing, motion: FrameMotion, network: Network) -> None:
         self.packing, self.motion = packing, motion
         self._network, self._lock = network, Lock()
-        self._load = packing.load(motion.endpoints, motion.side, motion.load)
+        self._load = packing.load(
+            motion.endpoints, motion.side, motion.load, (motion.grains.position, motion.grains.present)
+        )
         self._known: dict[float, _Network] = {}
 
     def at(self, fraction: float, impedance: Array) -> Instant:

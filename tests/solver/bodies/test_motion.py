@@ -148,6 +148,24 @@ def test_load_is_pressure_times_face():
     assert walls.loaded.tolist() == [False, False, True, False]
 
 
+def test_grains_of_the_boundary_bear_the_load_on_their_width():
+    radius = np.array([0.01, 0.01, 0.01, 0.005])
+    grains = Grains.of_rods(radius, density=2700.0, length=LENGTH, boundary=np.array([False, True, False, True]))
+    packing = Packing(grains, LENGTH, Material(0.3, 0.3), np.array([np.nan, np.nan, 5e4, np.nan]))
+    at_top = 0.05 - radius
+    position = np.column_stack([[0.02, 0.04, 0.06, 0.08], at_top])
+    whole, seen = packing.load(WALLS)[2], np.ones(4, np.bool_)
+    assert packing.load(WALLS, placed=(position, seen))[2] == pytest.approx(20.0 / 35.0 * whole)
+    away = position - [[0.0, 0.0], [0.0, 2e-3], [0.0, 0.0], [0.0, 0.0]]  # a boundary grain that touches no plate
+    assert packing.load(WALLS, placed=(away, seen))[2] == pytest.approx(20.0 / 25.0 * whole)
+    assert packing.load(WALLS, placed=(position, seen & grains.boundary))[2] == whole  # nothing else would set a scale
+    snapshot = Snapshot(0.0, position, np.zeros(4), seen, WALLS, 1e-5)
+    assert packing.walls_of(snapshot).load[2] == pytest.approx(20.0 / 35.0 * whole)
+    measured = replace(snapshot, load=np.array([np.nan, np.nan, 70.0, np.nan]))
+    assert packing.walls_of(measured).load[2] == pytest.approx(40.0)
+    assert packing.mean_pressure(measured) == pytest.approx(70.0 / (0.1 * LENGTH))
+
+
 @pytest.mark.parametrize(
     "wrong", [{"friction": -0.1}, {"wall_friction": -0.1}, {"formal_weight": 0.6}, {"formal_weight": -0.1}]
 )
