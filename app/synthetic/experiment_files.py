@@ -62,6 +62,11 @@ def write_cell(path: Path, vectors: Array) -> None:
     _write(path, ("frame", "ax", "ay", "bx", "by"), rows)
 
 
+def write_boundary(path: Path, names: NDArray[np.int64]) -> None:
+    """Write the ids (b,) of the grains that are the boundary as boundary.csv."""
+    _write(path, ("id",), ((str(each),) for each in names))
+
+
 def write_arcs(path: Path, names: Sequence[str], endpoints: Array, side: NDArray[np.int8]) -> None:
     """Write circles by their diameters (f, w, 2, 2) [m] as arcs.csv, with their rotations."""
     centre, radius, angle = circle_parameters(endpoints)
@@ -181,16 +186,16 @@ def write_experiment(
         The [photographs] or [tracks] table.
     known : StatedInputs
     boundary : str
-        A table in place of [walls].
+        The [boundary] table, beside the walls or in place of them.
     walls : str
-        The keys of [walls] that name tables.
+        The keys of [walls] that name tables; empty: there are none.
     """
     name = re.sub(r"[^\w .+-]", "-", name)
     name = name if re.match(r"\w", name) else f"synthetic {name}"
     remarks = "".join(f"# {line}\n" for line in remark.splitlines())
     sensors = 'forces = "wall_forces.csv"\n' if known.pressure else ""
     plates = "".join(f"[walls.{wall}]\npressure = {value}\n" for wall, value in known.pressure.items())
-    walls = f"[walls]\n{walls}{sensors}{plates}"
+    walls = f"[walls]\n{walls}{sensors}{plates}" if walls else ""
     gravity = f"gravity = [{known.gravity[0]}, {known.gravity[1]}]\n" if any(known.gravity) else ""
     write_atomically(
         path,
@@ -199,7 +204,7 @@ truth = "truth_contacts.csv"
 truth_tracks = "truth_tracks.csv"
 
 {source}
-{boundary or walls}
+{boundary}{walls}
 [material]
 density = {known.density}
 length = {known.length}

@@ -57,7 +57,7 @@ class Simulation(ABC):
         sign = np.where(np.random.default_rng(n).permutation(n) % 2 == 0, 1.0, -1.0)
         self._bodies = DemBodies(
             state, np.zeros((n, 3)), grains.radius, grains.mass, np.zeros((n, 3)), base_limit,
-            np.maximum(1.0 + np.sqrt(2.0) * settings.friction_spread * sign, 0.0),
+            np.maximum(1.0 + np.sqrt(2.0) * settings.friction_spread * sign, 0.0), np.zeros((n, 2)),
         )  # fmt: skip
         self._law = Law(
             time_step=self.time_step,
@@ -141,7 +141,7 @@ class Simulation(ABC):
         if not np.any(fn > 0.0):
             return float("inf")
         gravity = self.grains.mass[:, None] * np.array([self._law.gravity_x, self._law.gravity_y])
-        resultant = np.linalg.norm(self._bodies.force[:, :2] + gravity, axis=1)
+        resultant = np.linalg.norm(self._bodies.force[:, :2] + self._bodies.external + gravity, axis=1)
         return float(resultant.mean() / fn[fn > 0.0].mean())
 
     @property

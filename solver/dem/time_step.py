@@ -50,6 +50,7 @@ class DemBodies(NamedTuple):
     base: Array  # (n, 3) springs of the base friction: fx, fy [N], moment over the radius [N]
     base_limit: Array  # (n,) [N], greatest friction of the base
     roughness: Array  # (n,) the friction of a contact is the mean of both grains' times the law's
+    external: Array  # (n, 2) [N] further forces, as of a membrane
 
 
 class DemPairs(NamedTuple):
@@ -105,8 +106,8 @@ def move_grains(bodies: DemBodies, law: Law, shear: float, stretch: float) -> fl
     fastest = 0.0
     for k in range(mass.shape[0]):
         a = dt / mass[k]
-        state[k, VX] = keep * state[k, VX] + a * force[k, 0] + dt * law.gravity_x
-        state[k, VY] = keep * state[k, VY] + a * force[k, 1] + dt * law.gravity_y
+        state[k, VX] = keep * state[k, VX] + a * (force[k, 0] + bodies.external[k, 0]) + dt * law.gravity_x
+        state[k, VY] = keep * state[k, VY] + a * (force[k, 1] + bodies.external[k, 1]) + dt * law.gravity_y
         state[k, OMEGA] = keep * state[k, OMEGA] + 2.0 * a * force[k, 2] / bodies.radius[k] ** 2
         x, y = state[k, X], state[k, Y]
         state[k, X] = x + dt * (state[k, VX] + stretch * x + shear * y)

@@ -39,7 +39,8 @@ def make_cell(load: float, side_load: float = np.nan):
     boundary = Boundary(FRAME, np.array([shear, height, -0.3, width, 0.2, 0.0]), plates, np.zeros(4))
     base_limit = rng.choice([0.0, 3.0, 400.0], n)
     roughness = np.random.default_rng(6).choice([0.5, 1.0, 1.6], n)
-    bodies = DemBodies(state, np.zeros((n, 3)), radius, mass, np.zeros((n, 3)), base_limit, roughness)
+    external = np.random.default_rng(7).normal(0.0, 40.0, (n, 2))
+    bodies = DemBodies(state, np.zeros((n, 3)), radius, mass, np.zeros((n, 3)), base_limit, roughness, external)
     near = [(i, j) for i in range(n) for j in range(i + 1, n) if np.hypot(*(position[j] - position[i])) < 0.0163]
     rows = {0: range(SIDE), 1: range(SIDE - 1, n, SIDE), 2: range(n - SIDE, n), 3: range(0, n, SIDE)}
     walls = sorted((i, w) for w, grains in rows.items() for i in grains)
@@ -55,7 +56,8 @@ def make_cell(load: float, side_load: float = np.nan):
     plain = PlainCell(
         position.copy(), state[:, 2].copy(), velocity.copy(), spin.copy(), np.zeros((n, 2)), np.zeros(n), radius, mass,
         shear, height, -0.3, width, 0.4, None if np.isnan(load) else load, 80.0, 0.2,
-        None if np.isnan(side_load) else (0.3, side_load, 60.0), base_limit, roughness, LAW, near, walls, damping,
+        None if np.isnan(side_load) else (0.3, side_load, 60.0), base_limit, roughness, external, LAW, near, walls,
+        damping,
     )  # fmt: skip
     return bodies, pair_list, wall_list, boundary, plain
 

@@ -29,7 +29,9 @@ def make_bodies() -> tuple[DemBodies, DemPairs, Boundary]:
     boundary = Boundary(
         CELL, np.array([*cell.ravel(), 4e3, 0.0]), np.zeros((2, 3)), np.array([REQUIRED, VISCOSITY, 10.0, LENGTH])
     )
-    bodies = DemBodies(state, rng.normal(0, 1, (3, 3)), radius, mass, np.zeros((3, 3)), np.zeros(3), np.ones(3))
+    bodies = DemBodies(
+        state, rng.normal(0, 1, (3, 3)), radius, mass, np.zeros((3, 3)), np.zeros(3), np.ones(3), np.zeros((3, 2))
+    )
     return bodies, pairs, boundary
 
 

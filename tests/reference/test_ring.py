@@ -29,7 +29,7 @@ def test_forces_of_circles_are_the_plain_ones():
     place = away[:, None] * unit + np.where(at_ring[:, None], 0.0, CIRCLES[3:5])
     state = np.column_stack([place, rng.normal(0, 1, (n, 2)), rng.normal(0, 0.5, n), rng.normal(0, 40.0, n)])
     empty = np.zeros((n, 3))
-    bodies = DemBodies(state, empty.copy(), radius, np.full(n, 0.03), empty, np.zeros(n), np.ones(n))
+    bodies = DemBodies(state, empty.copy(), radius, np.full(n, 0.03), empty, np.zeros(n), np.ones(n), np.zeros((n, 2)))
     boundary = Boundary(RING, CIRCLES, np.zeros((2, 3)), np.zeros(4))
     wall, damping = np.where(at_ring, 0, 1).astype(np.int32), rng.choice([1.0, 200.0, 900.0], n)
     image = np.zeros((n, 2), np.int64)

@@ -1,4 +1,4 @@
-"""Loading paths of other apparatus: direct shear box, footing and intruder in a bed, rotating drum."""
+"""Loading paths of other apparatus: direct shear box, footing and intruder in a bed, drum, membrane."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ import numpy as np
 from ...process.progress import Progress, no_progress
 from ...solver.bodies.wall_shapes import Sides
 from ...solver.dem.box_cell import BOX_NAMES, BoxCell, BoxSize, Tool
-from ...solver.dem.dem_truth import DemFrame, DemTruth
+from ...solver.dem.dem_truth import WALL_NAMES, DemFrame, DemTruth
+from ...solver.dem.membrane_cell import MembraneCell
 from ...solver.dem.ring_cell import CIRCLE_NAMES, CIRCLE_SIDES, RingCell
+from ...solver.dem.shear_cell import FrameSize
 from ..dense_packing import prepare_packing
 from ..placement import place_in_picture, tilt_box
 from ..ring_packing import prepare_drum
-from .loading_paths import BOX_HEIGHT, HEAP_PRESSURE, MARGIN, LoadingPath, rested
+from .loading_paths import BOX_HEIGHT, HEAP_PRESSURE, MARGIN, SPAN, LoadingPath, rested
 
 BOX_ASPECT, BED_ASPECT = 0.7, 0.6  # height over width
 MOBILISED = 8  # steps of the motion before the first photograph
@@ -81,6 +83,21 @@ def turn_drum(cell: RingCell, loading: LoadingPath) -> Iterator[DemFrame]:
         yield cell.photograph(cell.rest())
 
 
+def compress_in_membrane(cell: MembraneCell, loading: LoadingPath) -> Iterator[DemFrame]:
+    """Lower the plate on a packing beside a membrane; step: axial strain."""
+    first = cell.height
+    for k in range(MOBILISED, MOBILISED + loading.frames):
+        cell.move_to(height=first * (1.0 - k * loading.step))
+        yield cell.photograph(cell.rest())
+
+
+def _prepare_membrane(loading: LoadingPath, grains: int, rng: np.random.Generator) -> MembraneCell:
+    """Return a packing at rest under the pressure of the membrane on its right side."""
+    packed = prepare_packing(grains, rng, loading.settings, sizes=loading.sizes)
+    size = FrameSize(packed.width, packed.height, SPAN * packed.width)
+    return rested(MembraneCell(packed.grains.radius, packed.position, size, loading.settings))
+
+
 def _prepare_box(loading: LoadingPath, grains: int, rng: np.random.Generator) -> BoxCell:
     """Return a packing at rest under the plate's pressure, in a box that is split at half its height."""
     packed = prepare_packing(grains, rng, loading.settings, aspect=BOX_ASPECT, sizes=loading.sizes)
@@ -125,7 +142,7 @@ def _prepare_drum(loading: LoadingPath, grains: int, rng: np.random.Generator) -
 
 
 class _Apparatus(NamedTuple):
-    prepare: Callable[[LoadingPath, int, np.random.Generator], Any]  # a BoxCell or a RingCell
+    prepare: Callable[[LoadingPath, int, np.random.Generator], Any]  # a Simulation
     names: tuple[str, ...]  # of the walls
     absent: tuple[str, ...]  # of those that it has not
 
@@ -135,5 +152,6 @@ APPARATUS: dict[Callable[[Any, LoadingPath], Iterator[DemFrame]], _Apparatus] = 
     slide_box: _Apparatus(_prepare_box, BOX_NAMES, ("tool",)),
     press_footing: _Apparatus(_prepare_footing, (*BOX_NAMES[:-1], "footing"), _HALVES),
     push_intruder: _Apparatus(_prepare_intruder, (*BOX_NAMES[:-1], "intruder"), _HALVES),
+    compress_in_membrane: _Apparatus(_prepare_membrane, WALL_NAMES, ("right",)),
     turn_drum: _Apparatus(_prepare_drum, CIRCLE_NAMES, ("core",)),
 }

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...solver.bodies.grains import Array
+from ...solver.dem.membrane_cell import membrane_width
 from .observed_data import ObservedData
 
 Departure = Callable[[ObservedData, np.random.Generator], ObservedData]
@@ -71,6 +72,17 @@ def crop_to_interior(observed: ObservedData, rng: np.random.Generator) -> Observ
         rotation=observed.rotation[:, cache], endpoints=observed.endpoints[:, :0], wall_names=(), outer=True,
         known=replace(observed.known, pressure={}),
     )  # fmt: skip
+
+
+def state_membrane(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """State as the boundary all rods that a membrane on the right touches in any photograph."""
+    top = observed.endpoints[:, observed.wall_names.index("top"), :, 1].mean(axis=1)
+    bottom = observed.endpoints[:, observed.wall_names.index("bottom"), :, 1].mean(axis=1)
+    touched = [
+        membrane_width(position - [0.0, low], observed.radius, high - low) > 0.0
+        for position, low, high in zip(observed.position, bottom, top, strict=True)
+    ]
+    return replace(observed, boundary=observed.id[np.any(touched, axis=0)])
 
 
 def move_camera(observed: ObservedData, rng: np.random.Generator) -> ObservedData:

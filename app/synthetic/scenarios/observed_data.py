@@ -33,6 +33,7 @@ class ObservedData:
     known: StatedInputs
     cell: Array | None = None  # (f, 2, 2) [m] vectors of the periodic cell, in place of walls
     outer: bool = False  # the outermost grains are the boundary
+    boundary: NDArray[np.int64] | None = None  # (b,) ids of grains that are the boundary beside the walls; None: none
     side: Sides = None  # (w,) which walls are circles; None: none
     measured: tuple[str, ...] = ()  # walls whose loads sensors measure
     load: Array = field(default_factory=lambda: np.empty((0, 0)))  # (f, loads) [N] on them
@@ -108,6 +109,8 @@ def write_observed(folder: Path, observed: ObservedData, truth: DemTruth, remark
         truth = truth.without_walls()
     if observed.cell is not None:
         files.write_cell(folder / "cell.csv", observed.cell)
+    if observed.boundary is not None:
+        files.write_boundary(folder / "boundary.csv", observed.boundary)
     if observed.known.pressure:
         files.write_wall_forces(folder / "wall_forces.csv", truth)
     files.write_truth_contacts(folder / "truth_contacts.csv", truth)
@@ -126,9 +129,11 @@ precision = {observed.precision:g}
 
 
 def _boundary(observed: ObservedData) -> str:
-    """Return the [boundary] table of the experiment file, empty with walls."""
+    """Return the [boundary] table of the experiment file, empty where walls alone are the boundary."""
     if observed.cell is not None:
         return '[boundary]\nperiodic = "cell.csv"\n'
+    if observed.boundary is not None:
+        return '[boundary]\ngrains = "boundary.csv"\n'
     return '[boundary]\ngrains = "outer"\n' if observed.outer else ""
 
 

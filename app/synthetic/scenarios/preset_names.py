@@ -15,7 +15,7 @@ ScenarioName = Literal[
     "corners", "short_walls", "unseen", "camera", "centres", "radii_03", "radii_1", "radius_offset",
     "mu_low", "mu_high", "step_05", "step_1", "ten_frames", "periodic", "outer", "circle", "loads",
     "loose", "cyclic", "noise_40", "correlated_noise", "annulus", "tilted_bed", "tiny_cycles", "power_law",
-    "shear_box", "footing", "intruder", "drum", "stiffest",
+    "membrane", "shear_box", "footing", "intruder", "drum", "stiffest",
     "stiff", "stiff_moving", "stiff_loose", "stiff_noise_40",
     "base_friction", "cohesion", "strong_cohesion", "friction_spread",
     "smooth_walls", "smooth_walls_spread", "rough_walls", "inertia", "strong_inertia", "rolling", "sizes_10",

@@ -12,7 +12,17 @@ import numpy as np
 from ...process.atomic import replacing
 from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
-from ...solver.dem import boundaries, box_cell, contact_law, periodic_cell, ring_cell, shear_cell, simulation, time_step
+from ...solver.dem import (
+    boundaries,
+    box_cell,
+    contact_law,
+    membrane_cell,
+    periodic_cell,
+    ring_cell,
+    shear_cell,
+    simulation,
+    time_step,
+)
 from ...solver.dem.dem_truth import DemSettings, DemTruth
 from .. import dense_packing, ring_packing
 from ..experiment_files import refuse_full_folder
@@ -143,7 +153,7 @@ def _fingerprint(loading: LoadingPath) -> str:
     if loading.periodic:
         modules += [periodic_cell, periodic_packing]
     if loading.bed:
-        modules += [box_cell, ring_cell, ring_packing, bed_paths]
+        modules += [box_cell, membrane_cell, ring_cell, ring_packing, bed_paths]
     if loading.ring:
         modules += [ring_cell, ring_packing]
     for module in modules:

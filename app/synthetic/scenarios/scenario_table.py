@@ -11,7 +11,7 @@ import numpy as np
 from ...solver.bodies.grains import Array
 from ...solver.dem.dem_truth import DemSettings
 from ..dense_packing import choose_two_radii, choose_wide_radii
-from .bed_paths import press_footing, push_intruder, slide_box, turn_drum
+from .bed_paths import compress_in_membrane, press_footing, push_intruder, slide_box, turn_drum
 from .departures import (
     HIGH_FRICTION,
     LOW_FRICTION,
@@ -27,6 +27,7 @@ from .departures import (
     scatter_radii,
     shrink_radii,
     state_corners,
+    state_membrane,
     state_photoelastic_discs,
 )
 from .input_errors import (
@@ -237,6 +238,12 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     "drum": Scenario(
         "a drum that is half full turns by .75° a photograph; no plate",
         LoadingPath(turn_drum, 0.75, settings=HEAP, bed=True),
+    ),
+    "membrane": Scenario(
+        "compressed by .2 % a photograph beside a flexible membrane under 50 kPa; the rods that it touches are stated "
+        "as the boundary, the load on the plate is measured",
+        LoadingPath(compress_in_membrane, 0.002, measured=("top",), bed=True),
+        state_membrane,
     ),
     "shear_box": _missing(
         "direct shear box: the upper half slides over the lower one by .2 % of the width a photograph; its edges bear "

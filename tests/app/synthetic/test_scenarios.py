@@ -115,7 +115,8 @@ def test_a_packing_around_a_moving_core_is_in_equilibrium_under_the_rings_pressu
 @pytest.mark.parametrize(
     ("name", "walls"),
     [("shear_box", (*BOX_NAMES[:-1],)), ("footing", ("bottom", "right", "left", "footing")),
-     ("intruder", ("bottom", "right", "left", "intruder")), ("drum", ("ring",))],
+     ("intruder", ("bottom", "right", "left", "intruder")), ("drum", ("ring",)),
+     ("membrane", ("bottom", "top", "left"))],
 )  # fmt: skip
 def test_the_truths_of_other_apparatus_are_in_equilibrium(name: ScenarioName, walls: tuple[str, ...]) -> None:
     truth = simulate_bed(replace(SCENARIOS[name].loading, frames=2), FEW, seed=3)
@@ -131,8 +132,27 @@ def test_the_truths_of_other_apparatus_are_in_equilibrium(name: ScenarioName, wa
         assert np.allclose(truth.position[1] - truth.position[0], 0.0, atol=0.01)
     else:
         assert (force_on(truth, walls[-1]) > 0.0).all()
+    if name == "membrane":  # less the friction on plate and bottom
+        height = np.diff(truth.endpoints[:, :2, 0, 1], axis=1)[:, 0]
+        load = truth.settings.pressure * truth.settings.length * height
+        assert force_on(truth, "left") == pytest.approx(load, rel=0.3)
     if name == "footing":
         assert force_on(truth, "bottom") == pytest.approx(weight.sum() + force_on(truth, "footing"), rel=0.3)
+
+
+@pytest.mark.thorough
+def test_rods_at_a_membrane_are_stated_as_boundary_beside_the_walls(tmp_path: Path, monkeypatch) -> None:
+    truth = simulate_bed(replace(SCENARIOS["membrane"].loading, frames=2), FEW, seed=3)
+    monkeypatch.setattr("rodsight.synthetic.scenarios.scenario_folder.load_or_simulate", lambda *_: truth)
+    folder = make_scenario(tmp_path / "membrane", "membrane", 3, grains=FEW).folder
+    written = tomllib.loads((folder / "experiment.toml").read_text())
+    assert written["boundary"] == {"grains": "boundary.csv"}
+    assert written["walls"] == {"file": "walls.csv", "load": "load.csv"}
+    stated = [int(row["id"]) for row in columns(folder / "boundary.csv")]
+    assert truth.position[0, :, 0].argmax() in stated
+    assert len(stated) < FEW / 2
+    right = truth.position[0, stated, 0].mean()
+    assert right > np.median(truth.position[0, :, 0])
 
 
 @pytest.mark.thorough

@@ -34,6 +34,7 @@ class PlainCell:
     side: tuple[float, float, float] | None  # mass [kg], load [N], damping [N s/m] of the right side; None: driven
     base_limit: Array  # (n,) [N]
     roughness: Array  # (n,) factor of the friction between grains
+    external: Array  # (n, 2) [N] further forces
     law: Law
     pairs: list[tuple[int, int]]
     wall_pairs: list[tuple[int, int]]
@@ -54,7 +55,8 @@ class PlainCell:
         fastest = 0.0
         for k in range(len(self.mass)):
             inertia = 0.5 * self.mass[k] * self.radius[k] ** 2
-            self.velocity[k] = (1.0 - law.drag * dt) * self.velocity[k] + dt * (self.force[k] / self.mass[k] + gravity)
+            acceleration = (self.force[k] + self.external[k]) / self.mass[k] + gravity
+            self.velocity[k] = (1.0 - law.drag * dt) * self.velocity[k] + dt * acceleration
             self.spin[k] = (1.0 - law.drag * dt) * self.spin[k] + dt * self.torque[k] / inertia
             self.position[k] = self.position[k] + dt * self.velocity[k]
             self.angle[k] += dt * self.spin[k]
