@@ -54,4 +54,4 @@ def membrane_width(position: Array, radius: Array, height: float) -> Array:
     inside = radius[:, None] ** 2 - (y - position[:, 1, None]) ** 2
     surface = np.where(inside > 0.0, position[:, 0, None] + np.sqrt(np.maximum(inside, 0.0)), -np.inf)
     met = surface.argmax(axis=0)[np.isfinite(surface.max(axis=0))]
-    return spacing * np.bincount(met, minlength=len(radius))
+    return spacing * np.bincount(met, minlength=len(radius)).astype(np.float64)
