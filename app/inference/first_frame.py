@@ -19,7 +19,7 @@ from ..solver.calibration.grain_errors import find_grain_errors
 from ..solver.contacts.verdicts import NO_VERDICTS
 from ..solver.frame_forces import FrameForces, FrameStatus
 from ..solver.mixture.fringe_evidence import calibrate_sequence_fringes
-from ..solver.mixture.position_estimates import frame_generator
+from ..solver.mixture.position_estimates import frame_generator, infer_alone
 from ..solver.posterior.frame_posterior import FramePosterior, infer_frame
 from ..solver.posterior.sequence_evidence import SequenceEvidence
 from ..tracks import Tracks, WallTracks
@@ -70,7 +70,7 @@ def estimate_first_frame(
 def _posterior_of_positions(sequence: CorrectedSequence, tracks: Tracks) -> FramePosterior | None:
     """Position-only estimate of the first frame; None where no two bodies are close."""
     try:
-        evidence = gather_evidence_of(sequence, tracks)
+        evidence = gather_evidence_of(sequence, tracks, soft=_rests_on_positions(sequence))
     except ValueError:  # no two bodies are close
         return None
     return _sample(sequence, evidence, None)
@@ -105,8 +105,15 @@ def _sample(
         return None
     if gap_sd is not None:
         first = replace(first, gap_sd=gap_sd)
-    settings = evidence.settings.for_isolated_frame()
-    return infer_frame(first, settings, frame_generator(0), sequence.settings.workers)
+    workers = sequence.settings.workers
+    if _rests_on_positions(sequence):
+        return infer_alone(first, evidence.settings, frame_generator(0), workers)
+    return infer_frame(first, evidence.settings.for_isolated_frame(), frame_generator(0), workers)
+
+
+def _rests_on_positions(sequence: CorrectedSequence) -> bool:
+    """Whether forces follow from overlaps without fringes."""
+    return sequence.settings.soft and sequence.tracks.fringes is None
 
 
 def _without_own_corrections(tracks: Tracks, walls: WallTracks, calibration: Calibration) -> Tracks:

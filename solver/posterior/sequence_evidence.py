@@ -133,6 +133,7 @@ def gather_position_evidence(
     settings: PosteriorSettings | None = None,
     *,
     shared_error: float = 0.0,
+    soft: bool = False,
 ) -> SequenceEvidence:
     """Gather the evidence of a sequence from its positions.
 
@@ -147,6 +148,8 @@ def gather_position_evidence(
     shared_error : float
         Standard deviation [m] of an error that all gaps may share (radii, pixel size, perspective). 0: calibrated; an
         error is then subtracted only where touching pairs stand apart, which no overlap explains.
+    soft : bool
+        Whether forces follow from overlaps, so that only errors of radii that last over the photographs count.
 
     Raises
     ------
@@ -175,7 +178,7 @@ def gather_position_evidence(
     gap = found.smooth
     error = _shared_error(packing, snapshots, series, touching) if corrected else np.zeros(len(series.key))
     overlap = 0.0 if corrected else max(-touching.offset, 0.0)
-    variances = _error_variances(packing, snapshots, series, gap, touching, wide)
+    variances = _error_variances(packing, snapshots, series, (gap, wide), touching, soft=soft)
     radius_sd = variances.radius_sd(overlap)
     # Drift of contacts looks like noise, and the stated noise may be too large: the smaller value is a lower limit.
     # Where pairs of a frame differ in smoothing, the largest remaining fraction counts.
@@ -222,11 +225,13 @@ def _error_variances(
     packing: Packing,
     snapshots: Sequence[Snapshot],
     series: GapSeries,
-    gap: Array,
+    smooth: tuple[Array, float],
     touching: TouchingGaps,
-    reach: float,
+    *,
+    soft: bool,
 ) -> ErrorVariances:
-    """Separate errors of radii from errors of centres in some of the frames; gap (f, c) [m] is smoothed."""
+    """Separate errors of radii from errors of centres in some of the frames; smooth: gaps (f, c) and reach [m]."""
+    gap, reach = smooth
     between = np.flatnonzero(~series.with_wall)
     covariate = pair_covariates(packing, snapshots, series)[between]
     rows = np.unique(np.linspace(0, len(snapshots) - 1, min(VARIANCE_FRAMES, len(snapshots))).astype(int))
@@ -240,7 +245,7 @@ def _error_variances(
         walls = packing.walls_of(snapshots[k])
         contacts = measure_pairs(packing.grains, snapshots[k].position, walls, series.key[between[seen]])
         frames.append((contacts, rest[row, seen], weight[row, seen]))
-    return estimate_error_variances(frames)
+    return estimate_error_variances(frames, lasting=soft)
 
 
 def _radius_correction(packing: Packing, touching: TouchingGaps, corrected: bool) -> Array:

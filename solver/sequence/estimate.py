@@ -247,8 +247,8 @@ def _mix(
         position_weight=position_weight,
     )  # fmt: skip
     assert estimate.balance is not None
-    convex = problem.settings.ensemble.convex
-    projected = project_mixed_field(estimate.balance, mixture.fn, mixture.ft, mixture.fn_sd, convex, total)
+    given = mixture.fn, mixture.ft, mixture.fn_sd, problem.settings.ensemble.convex, total
+    projected = project_mixed_field(estimate.balance, *given, soft=softness is not None)
     fn, ft = (projected.fn, projected.ft) if projected.converged else (mixture.fn, mixture.ft)
     members = estimate.members
     if not problem.motion.ends_here:  # no member has a history of its own yet

@@ -172,8 +172,9 @@ def _prepare(
     positions = balance = None
     if settings.uses_positions and len(snapshots) > 1:
         positions = PositionEstimates(
-            packing, snapshots, settings.posterior, settings.workers, posteriors, alike=settings.alike
-        )
+            packing, snapshots, settings.posterior, settings.workers, posteriors, alike=settings.alike,
+            alone=settings.soft and all(each.fringes is None for each in snapshots),
+        )  # fmt: skip
         assert settings.overlap is not None
         # Photographs alike request that of the same frame.
         balance = lru_cache(maxsize=1)(partial(_balance_overlaps, packing, snapshots, settings.overlap))

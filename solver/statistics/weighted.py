@@ -1,4 +1,4 @@
-"""Means over contacts weighted by their probability to bear force."""
+"""Means and medians over contacts weighted by their probability to bear force or to touch."""
 
 from __future__ import annotations
 
@@ -16,3 +16,10 @@ def weighted_mean(value: Array, weight: Array) -> float:
     """Return Σ w x / Σ w of values (c,) and weights (c,); 0 where Σ w = 0."""
     total = float(weight.sum())
     return float(weight @ value) / total if total > 0 else 0.0
+
+
+def weighted_median(value: Array, weight: Array) -> float:
+    """Return the value (c,) up to which half of the weight (c,) lies; Σ w > 0."""
+    order = np.argsort(value)
+    total = np.cumsum(weight[order])
+    return float(value[order[np.searchsorted(total, 0.5 * total[-1])]])

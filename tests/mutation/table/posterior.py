@@ -115,8 +115,11 @@ MUTANTS = [
         f"{TESTS}/test_error_variances.py",
         ("[contacts.normal, -contacts.normal]", "[contacts.normal, contacts.normal]"),
         (" + 2.0 * pairs(w * x * y)", ""),
-        ("** 2) - np.sum(value**2))", "** 2))"),
-        ("(GRAIN_PRESSURE_SD * overlap) ** 2", "GRAIN_PRESSURE_SD * overlap"),
+        (" - float(np.sum(value**2))", ""),
+        (" - _square_of_sums(self.contact, value)", ""),
+        (" - self._sum_within(value)", ""),
+        ("sides.without_outliers().solve", "sides.solve"),
+        ("(pressure_sd * overlap) ** 2", "pressure_sd * overlap"),
     ),
     *mutants_of(
         "solver/posterior/gap_series.py",

@@ -16,6 +16,7 @@ from rodsight.solver.mixture import equilibrium_projection
 from rodsight.solver.mixture.equilibrium_projection import (
     MAX_CHANGE,
     MAX_CHANGE_RELAXED,
+    MAX_CHANGE_SOFT,
     RELAXATION,
     project_mixed_field,
 )
@@ -97,6 +98,9 @@ def test_equilibrium_is_relaxed_no_further_than_necessary(monkeypatch):
     fn_sd = np.full(len(fn), 1.01 * size[2] / MAX_CHANGE_RELAXED)
     found = project_mixed_field(balance, fn, ft, fn_sd, ConvexSettings())
     np.testing.assert_array_equal(found.fn, relaxed[2])
+    fn_sd = np.full(len(fn), 1.01 * size[1] / MAX_CHANGE_SOFT)
+    found = project_mixed_field(balance, fn, ft, fn_sd, ConvexSettings(), soft=True)
+    np.testing.assert_array_equal(found.fn, relaxed[1])  # the forces of soft grains may change by more
 
 
 def test_without_contacts_the_projection_is_empty():

@@ -10,11 +10,13 @@ import pytest
 from rodsight.solver.contacts.verdicts import Verdicts
 from rodsight.solver.mixture.position_estimates import PositionEstimates
 from rodsight.solver.posterior.posterior_settings import PosteriorSettings
+from rodsight.solver.statistics.balance import grain_unbalance
 
 from tests.solver.posterior.simulated import SimulatedShear, simulate_shear
 
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
 
+SWEEPS = PosteriorSettings(annealing=60, burn_in=30, kept=60)
 FEW_SWEEPS = PosteriorSettings(annealing=20, burn_in=5, kept=10)
 
 
@@ -30,6 +32,24 @@ def test_estimate_does_not_depend_on_the_order_of_requests(soft) -> None:
     assert first is not None
     assert second is not None
     assert np.array_equal(first.fn, second.fn)
+
+
+def test_forces_of_positions_alone_are_nearer_to_balance_and_no_more_certain(soft) -> None:
+    beside, alone = (
+        PositionEstimates(soft.packing, soft.snapshots, SWEEPS, alone=each).at(2) for each in (False, True)
+    )
+    assert beside is not None
+    assert alone is not None
+    unbalance = [
+        float(
+            np.nanmean(
+                grain_unbalance(found.contacts, found.fn, found.ft, soft.packing.weight, soft.packing.grains.free)
+            )
+        )
+        for found in (beside, alone)
+    ]
+    assert unbalance[1] < 0.8 * unbalance[0]
+    assert float(np.median(alone.fn_sd)) > 0.7 * float(np.median(beside.fn_sd))
 
 
 def test_given_posteriors_are_used_as_they_are(soft) -> None:
