@@ -14,7 +14,7 @@ from ..bodies.packing import Packing
 from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts
 from ..detection.contact_networks import Network
-from .problem import ContactProblem, PreparedContacts, assemble
+from .problem import ContactProblem, PreparedContacts, assemble, with_impedance
 from .sweeping.ordering import VisitingOrder, order_contacts
 
 
@@ -58,10 +58,15 @@ class Interval:
             for known, problem in network.problems:
                 if np.array_equal(known, impedance):
                     return Instant(problem, network.contacts, network.walls)
-            problem = assemble(
-                self.packing.grains, network.state, network.walls, network.contacts, self.packing.material, impedance,
-                PreparedContacts(network.closing, network.order),
-            )  # fmt: skip
+            grains, material = self.packing.grains, self.packing.material
+            if network.problems:
+                alike = network.problems[0][1]
+                problem = with_impedance(alike, grains, network.state, network.walls, material, impedance)
+            else:
+                prepared = PreparedContacts(network.closing, network.order)
+                problem = assemble(
+                    grains, network.state, network.walls, network.contacts, material, impedance, prepared
+                )
             network.problems.append((impedance, problem))
             return Instant(problem, network.contacts, network.walls)
 

@@ -127,24 +127,8 @@ def assemble(
     n = grains.count
     if np.any(~motion.present[contacts.i]) or np.any(~motion.present[contacts.j[contacts.j < n]]):
         raise ValueError("a contact names a grain that is not present")
-    moved = motion.present & grains.free  # by forces; the others keep their measured velocity
-    compliance = np.where(grains.free, 1.0 / impedance, 0.0)
-    weight = grains.weight(material.gravity)
-    weight[~moved] = 0.0
-    body = np.zeros((n, 4))
-    body[:, :2] = motion.velocity + weight * compliance[:, None]
-    body[:, 2] = motion.spin * grains.radius
-    if grains.moment is not None:  # of half the inertia of the mass at the rim
-        body[moved, 2] += 2.0 * (compliance * grains.moment / grains.radius)[moved]
-    body[:, 3] = compliance
-    body[~motion.present] = 0.0
-
-    plate = np.zeros((walls.count, 2))
-    if walls.loaded.any():
-        plate_compliance = 1.0 / (PLATE_IMPEDANCE * impedance[motion.present].mean())
-        plate[walls.loaded, 0] = -walls.load[walls.loaded] * plate_compliance
-        plate[walls.loaded, 1] = plate_compliance
-
+    body, plate, weight = _free_motion(grains, motion, walls, material, impedance)
+    compliance = body[:, 3]
     closing, order = prepared or PreparedContacts()
     rows_pair, rows_wall, grouped = order_contacts(contacts) if order is None else order
     point, i, j = contacts.point, contacts.i, contacts.j
@@ -184,6 +168,46 @@ def assemble(
         weight,
         np.concatenate([rows_pair, rows_wall]),
     )
+
+
+def with_impedance(
+    problem: ContactProblem, grains: Grains, motion: GrainMotion, walls: Walls, material: Material, impedance: Array
+) -> ContactProblem:
+    """Assemble the problem of the same contacts and motion for another impedance (n,) [N s/m]."""
+    body, plate, weight = _free_motion(grains, motion, walls, material, impedance)
+    compliance, pair, wall = body[:, 3], aligned_zeros(problem.pair.shape), problem.wall.copy()
+    pair[:] = problem.pair
+    first, second = problem.pair_body[:, 0], problem.pair_body[:, 1]
+    # Zero are rows of padding, and of two bodies with imposed motion.
+    pair[:, 2] = np.where(pair[:, 2] > 0.0, _inverse(compliance[first] + compliance[second]), 0.0)
+    wall_w, plate_w = compliance[problem.wall_body[:, 0]], plate[problem.wall_body[:, 1], 1]
+    wall[:, 2] = _inverse(wall_w + wall[:, 6] ** 2 * plate_w)
+    wall[:, 3] = _inverse(3.0 * wall_w + wall[:, 7] ** 2 * plate_w)
+    return problem._replace(body=body, plate=plate, pair=pair, wall=wall, external=weight)
+
+
+def _free_motion(
+    grains: Grains, motion: GrainMotion, walls: Walls, material: Material, impedance: Array
+) -> tuple[Array, Array, Array]:
+    """Motion of bodies (n, 4) and plates (w, 2) without contact forces, as of `ContactProblem`, and weight (n, 2)."""
+    moved = motion.present & grains.free  # by forces; the others keep their measured velocity
+    compliance = np.where(grains.free, 1.0 / impedance, 0.0)
+    weight = grains.weight(material.gravity)
+    weight[~moved] = 0.0
+    body = np.zeros((grains.count, 4))
+    body[:, :2] = motion.velocity + weight * compliance[:, None]
+    body[:, 2] = motion.spin * grains.radius
+    if grains.moment is not None:  # of half the inertia of the mass at the rim
+        body[moved, 2] += 2.0 * (compliance * grains.moment / grains.radius)[moved]
+    body[:, 3] = compliance
+    body[~motion.present] = 0.0
+
+    plate = np.zeros((walls.count, 2))
+    if walls.loaded.any():
+        plate_compliance = 1.0 / (PLATE_IMPEDANCE * impedance[motion.present].mean())
+        plate[walls.loaded, 0] = -walls.load[walls.loaded] * plate_compliance
+        plate[walls.loaded, 1] = plate_compliance
+    return body, plate, weight
 
 
 def _inverse(value: Array) -> Array:

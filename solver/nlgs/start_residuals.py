@@ -40,14 +40,14 @@ class StartResiduals:
         return float(COLD_SWEEPS[row - 1] * (COLD_SWEEPS[row] / COLD_SWEEPS[row - 1]) ** fraction - 1.0)
 
 
-def measure_start_residuals(step: ChainStep) -> StartResiduals:
-    """Measure the start residuals of the last sub-step of a chain."""
+def measure_start_residuals(step: ChainStep, *, with_cold: bool = True) -> StartResiduals:
+    """Measure the start residuals of the last sub-step of a chain, those of a cold start only on request."""
     if step.contacts.count == 0:
         return StartResiduals(np.nan, np.full(len(COLD_SWEEPS), np.nan))
     warm = np.nan
     if step.previous_force is not None:
         warm = solve(step.problem, NlgsSettings(1), guess=step.previous_force).natural_map
-    return StartResiduals(warm, cold_residuals(step.problem))
+    return StartResiduals(warm, cold_residuals(step.problem) if with_cold else np.full(len(COLD_SWEEPS), np.nan))
 
 
 def cold_residuals(problem: ContactProblem) -> Array:

@@ -115,7 +115,8 @@ def _describe(
     material, contacts, step = problem.packing.material, estimate.contacts, estimate.step
     fn, ft = estimate.fn, estimate.ft
     un, ut = _measured_motion(problem, contacts, estimate)
-    starts = measure_start_residuals(step)
+    # 512 sweeps, for a curve beside those of the recorded sweeps.
+    starts = measure_start_residuals(step, with_cold=problem.settings.chain.keep != "none")
     bears, slides = _contact_probabilities(problem, estimate)
     strain = _strain_since_start(problem)
     reason = (estimate.remark, decision.reason, step.solution.stop.value)

@@ -1,8 +1,10 @@
 """The compiled sweeps against the plain ones, on a packing that reaches every branch."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from rodsight.solver.nlgs.problem import PLATE_IMPEDANCE, inertial_impedance, kinematic_impedance
+from rodsight.solver.nlgs.problem import PLATE_IMPEDANCE, inertial_impedance, kinematic_impedance, with_impedance
 from rodsight.solver.nlgs.sweeping.kernels import advance, apply_forces
 from rodsight.solver.nlgs.sweeping.ordering import GROUP
 
@@ -129,3 +131,10 @@ def test_impedances_follow_the_masses(case):
         assert kinematic[k] == pytest.approx(0.05 * 40.0 / 1e-5 / 0.8 * grains.mass[k] / mean)
     inertial = inertial_impedance(grains, interval=0.5, formal_weight=0.2)
     assert inertial == pytest.approx(grains.mass / (0.5 * 0.8))
+
+
+def test_another_impedance_gives_the_problem_that_is_assembled_with_it(case):
+    stiffer = replace(case, impedance=3.0 * case.impedance)
+    found = with_impedance(case.assemble(), case.grains, case.motion, case.walls, case.material, stiffer.impedance)
+    for one, other in zip(found, stiffer.assemble(), strict=True):
+        np.testing.assert_array_equal(one, other)

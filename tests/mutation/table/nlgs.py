@@ -95,6 +95,8 @@ MUTANTS = [
         ("grains.mass / grains.mass.mean()", "grains.radius / grains.radius.mean()"),
         ("weight = grains.weight(material.gravity)", "weight = 0.0 * grains.weight(material.gravity)"),
         ("_inverse(3.0 * wall_w + along", "_inverse(wall_w + along"),
+        ("_inverse(3.0 * wall_w + wall[:, 7]", "_inverse(wall_w + wall[:, 7]"),
+        ("_inverse(compliance[first] + compliance[second])", "pair[:, 2]"),
         ("contacts.normal[rows_wall]) + closing[rows_wall]", "contacts.normal[rows_wall])"),
         ('np.einsum("ij,ij->i", velocity, contacts.tangent[rows_wall])', "np.zeros(len(rows_wall))"),
         ("_inverse(pair_w), closing[rows_pair]]", "_inverse(pair_w), 0.0 * closing[rows_pair]]"),

@@ -53,6 +53,13 @@ def test_a_warm_start_has_a_smaller_residual_than_a_cold_one(frames: list[FrameF
         assert not frame.sweeps_saved <= 0.0  # NaN: more sweeps than COLD_SWEEPS
 
 
+def test_where_no_sweeps_are_recorded_there_is_no_cold_start() -> None:
+    packing, snapshots = sheared_frames(3)
+    frames = [frame for frame, _ in solve_sequence(packing, snapshots, SETTINGS.without_sweeps())]
+    assert all(np.isnan(frame.cold_residual).all() for frame in frames)
+    assert np.isfinite(frames[-1].warm_residual)
+
+
 def test_without_contacts_there_are_no_start_residuals() -> None:
     packing, snapshots = sheared_frames(1)
     nothing = SETTINGS.__class__(estimator="nlgs", chain=SETTINGS.chain, threshold=-1.0)
