@@ -106,7 +106,12 @@ class FrameForces:
     shear_step: Annotated[float, Quantity("the same since the frame before", "rad", since=2)] = NAN
     warm_residual: Annotated[float, Quantity("natural map after one sweep from the previous forces", since=2)] = NAN
     cold_residual: Annotated[
-        Array | None, Quantity("natural map after 1, 2, 4, … sweeps from zero forces", dims="cold_sweep", since=2)
+        Array | None,
+        Quantity(
+            "natural map after 1, 2, 4, … sweeps from zero forces, NaN where no sweeps are kept",
+            dims="cold_sweep",
+            since=2,
+        ),
     ] = None
     sweeps_saved: Annotated[
         float,
