@@ -21,17 +21,15 @@ from ..contacts.pairs import Keys, align, are_among
 from ..convex.ensemble_members import NormalisedSlip
 from ..convex.program import Balance
 from ..detection.contact_networks import ThresholdNetwork
-from ..mixture.equilibrium_projection import project_mixed_field
+from ..mixture.equilibrium_mixture import FrameBalance, mix_in_equilibrium
 from ..mixture.frame_mixture import (
     ForceEstimate,
     Mixture,
     Softness,
     limit_by_fringes,
-    mix_on_contacts,
     motion_weight,
     overlap_scale,
 )
-from ..mixture.stress_matching import stress_factors
 from ..nlgs.chain import ChainStep, advance_chain
 from ..nlgs.force_memory import ForceMemory
 from ..posterior.frame_posterior import FramePosterior
@@ -228,34 +226,27 @@ def _mix(
     contacts = estimate.contacts
     assert estimate.fn_sd is not None
     assert estimate.ft_sd is not None
+    assert estimate.balance is not None
     field = ForceEstimate(estimate.fn, estimate.ft, estimate.fn_sd, estimate.ft_sd)
     softness = None
     if problem.settings.soft:
         seen = problem.settings.measured_overlap
         weight = motion_weight(positions.overlap, motion_scale(problem.motion, problem.snapshot.sigma)) if seen else 0.0
         softness = Softness(problem.settings.soft_trust, weight)
-    known, total = problem.packing.scale_is_known, None
-    if known and softness is None and not np.isnan(reliability):  # the stress follows from sliding, not from positions
-        total = float(estimate.fn.sum())
-        if not any(problem.packing.material.gravity):  # nor is it uniform under weight
-            position = problem.snapshot.position
-            stress = love_weber_stress(contacts, estimate.fn, estimate.ft, position, 1.0, 1.0)
-            factor = stress_factors(positions.contacts, positions.fn, positions.ft, position, stress)
-            positions = replace(positions, stress_factor=factor)
-    mixture = mix_on_contacts(
-        contacts, field, positions, reliability, scale_known=known, softness=softness,
-        position_weight=position_weight,
+    frame = FrameBalance(
+        contacts, problem.snapshot.position, estimate.balance, problem.settings.ensemble.convex,
+        problem.packing.scale_is_known, any(problem.packing.material.gravity),
     )  # fmt: skip
-    assert estimate.balance is not None
-    given = mixture.fn, mixture.ft, mixture.fn_sd, problem.settings.ensemble.convex, total
-    projected = project_mixed_field(estimate.balance, *given, soft=softness is not None)
-    fn, ft = (projected.fn, projected.ft) if projected.converged else (mixture.fn, mixture.ft)
+    mixture = mix_in_equilibrium(
+        frame, field, positions, reliability, softness=softness, position_weight=position_weight
+    )
     members = estimate.members
     if not problem.motion.ends_here:  # no member has a history of its own yet
-        members = members.updated(contacts, np.column_stack([fn, ft]), problem.snapshot.present)
+        force = np.column_stack([mixture.fn, mixture.ft])
+        members = members.updated(contacts, force, problem.snapshot.present)
     remark = f"the position-only estimate has a weight of {100 * mixture.position_weight:.0f} %"
     return replace(
-        estimate, fn=fn, ft=ft, members=members, fn_sd=mixture.fn_sd, ft_sd=mixture.ft_sd,
+        estimate, fn=mixture.fn, ft=mixture.ft, members=members, fn_sd=mixture.fn_sd, ft_sd=mixture.ft_sd,
         motion=field, mixture=mixture, overlap=positions.overlap,
         remark="; ".join(part for part in (estimate.remark, remark) if part),
     )  # fmt: skip

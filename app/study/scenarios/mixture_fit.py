@@ -1,7 +1,8 @@
 """Fit of the weight of the position-only estimate beside the motion estimate, on simulated packings.
 
-Both estimates of a frame are mixed with all weights, and each mixture is compared with the truth. The weight that is
-fitted is that of least loss against the best one; what a mixture loses against its better part counts more.
+Both estimates of a frame are mixed with all weights as in a run, and each mixture is compared with the truth. The
+weight that is fitted is that of least loss against the best one; what a mixture loses against its better part counts
+more.
 """
 
 from __future__ import annotations
@@ -19,20 +20,35 @@ from scipy.optimize import minimize
 from scipy.special import expit
 
 from ...experiment.experiment import load_experiment
+from ...inference.corrected_sequence import CorrectedSequence
 from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
 from ...solver.assessment.fitted import FITTED
-from ...solver.assessment.mixture_trust import LEAST_WEIGHT, WEIGHT_TERMS, position_weight_terms
+from ...solver.assessment.mixture_trust import (
+    LEAST_WEIGHT,
+    WEIGHT_TERMS,
+    motion_reliability,
+    position_weight_terms,
+)
 from ...solver.baselines.motion_free import overlap_balance
 from ...solver.bodies.grains import Array
 from ...solver.contacts.pairs import Keys, align
 from ...solver.dem.dem_truth import UnbalancedError
+from ...solver.frame_forces import FrameForces
+from ...solver.mixture.equilibrium_mixture import FrameBalance, mix_in_equilibrium
+from ...solver.mixture.frame_mixture import ForceEstimate
 from ...solver.mixture.position_estimates import PositionEstimates
+from ...solver.posterior.frame_posterior import FramePosterior
+from ...solver.sequence.ensemble import assemble_frame_balance
+from ...solver.sequence.frame import pose_frame
+from ...solver.sequence.frame_problem import SequenceProblem
+from ...solver.sequence.state import SequenceState
 from ...solver.statistics.agreement import pearson
 from ...synthetic.scenarios.preset_names import ScenarioName
 from ...synthetic.scenarios.scenario_folder import make_scenario
 from .scenario_score import ScenarioSolution, StudyPlan, solve_scenario, true_forces
 
+ALONE = "solver.positions=never", "solver.keep_members=true"
 FIRST, STRIDE = 1, 2  # of the frames that are read
 WEIGHTS = np.linspace(0.0, 1.0, 11)  # of the position-only estimate
 TOLERATED, PRICE = 0.003, 3.0  # loss against the better part; its price beyond, over that of a loss against the best
@@ -47,11 +63,12 @@ class MixtureSample:
 
     kind: NDArray[np.str_]  # (f,)
     terms: Array  # (f, t) of the logarithm of w/(1 − w)
-    r: Array  # (f, 11) correlation of the mixture of every weight with the truth
+    r: Array  # (f, 11) correlation of the mixture of every weight with the truth; of weight 0 the motion estimate
+    positions: Array  # (f,) correlation of the position-only estimate, on contacts of its own
 
     def select(self, chosen: NDArray[np.bool_]) -> MixtureSample:
         """The chosen frames (f,)."""
-        return MixtureSample(self.kind[chosen], self.terms[chosen], self.r[chosen])
+        return MixtureSample(self.kind[chosen], self.terms[chosen], self.r[chosen], self.positions[chosen])
 
     def reached(self, weight: Array) -> Array:
         """Correlation (f,) of the mixtures of these weights (f,)."""
@@ -60,15 +77,15 @@ class MixtureSample:
     @property
     def better(self) -> Array:
         """Correlation (f,) of the better part."""
-        return np.maximum(self.r[:, 0], self.r[:, -1])
+        return np.maximum(self.r[:, 0], self.positions)
 
 
 def sample_mixtures(
     plan: StudyPlan, scenarios: Sequence[ScenarioName], seeds: Sequence[int], progress: Progress = no_progress
 ) -> MixtureSample:
     """Solve scenarios by their motion alone, and mix every second frame with its position-only estimate."""
-    motion = replace(plan, settings=(*plan.settings, "solver.positions=never"))
-    found: list[tuple[str, Array, Array]] = []
+    motion = replace(plan, settings=(*plan.settings, *ALONE))
+    found: list[tuple[str, Array, Array, float]] = []
     cases: list[tuple[ScenarioName, int]] = [(name, seed) for name in scenarios for seed in seeds]
     for done, (name, seed) in enumerate(cases):
         progress("mixtures", done, len(cases))
@@ -82,8 +99,7 @@ def sample_mixtures(
             except (InputError, UnbalancedError):
                 continue
             found += [(name, *each) for each in _mix_frames(solution, true_forces(experiment, solution.sequence))]
-    kinds, terms, r = zip(*found, strict=True)
-    return MixtureSample(np.array(kinds), np.array(terms), np.array(r))
+    return MixtureSample(*(np.array(column) for column in zip(*found, strict=True)))
 
 
 def fit_weight(sample: MixtureSample) -> Array:
@@ -120,7 +136,7 @@ def print_mixture(console: Console, sample: MixtureSample) -> None:
             continue
         weight[away] = expit(sample.select(away).terms @ fit_weight(sample.select(~away)))
     rows = {
-        "motion alone": sample.r[:, 0], "positions alone": sample.r[:, -1], "the better of both": sample.better,
+        "motion alone": sample.r[:, 0], "positions alone": sample.positions, "the better of both": sample.better,
         "the best weight": sample.r.max(axis=1), "fitted": sample.reached(expit(sample.terms @ coefficients)),
         "fitted, kinds left out in turn": sample.reached(weight),
     }  # fmt: skip
@@ -144,7 +160,7 @@ def _print_kinds(console: Console, sample: MixtureSample) -> None:
     for kind in np.unique(sample.kind):
         of_kind = sample.kind == kind
         motion, positions, both = (
-            float(each[of_kind].mean()) for each in (sample.r[:, 0], sample.r[:, -1], mixed)
+            float(each[of_kind].mean()) for each in (sample.r[:, 0], sample.positions, mixed)
         )  # fmt: skip
         lost = max(motion, positions) - both
         worse += [str(kind)] if lost > EXCESS else []
@@ -157,8 +173,8 @@ def _print_kinds(console: Console, sample: MixtureSample) -> None:
     )  # fmt: skip
 
 
-def _mix_frames(solution: ScenarioSolution, true: Sequence[tuple[Keys, Array]]) -> list[tuple[Array, Array]]:
-    """Terms (t,) and correlations (11,) of the frames of hard grains under a known load."""
+def _mix_frames(solution: ScenarioSolution, true: Sequence[tuple[Keys, Array]]) -> list[tuple[Array, Array, float]]:
+    """Terms (t,) and correlations (11,) of the frames of hard grains under a known load, and of positions alone."""
     sequence, found = solution.sequence, []
     if sequence.settings.soft or not sequence.packing.scale_is_known:
         return []
@@ -169,18 +185,41 @@ def _mix_frames(solution: ScenarioSolution, true: Sequence[tuple[Keys, Array]]) 
             continue
         noise = float(np.hypot(sequence.snapshots[k].sigma, sequence.settings.overlap or 0.0))
         contacts, force = overlap_balance(sequence.packing, sequence.snapshots, k, noise)
-        motion = frame.contacts.key, frame.fn / frame.fn.sum()
-        geometry = positions.contacts.key, positions.fn / positions.fn.sum()
-        balance = contacts.key, force[:, 0]
+        motion = frame.contacts.key, frame.fn
+        geometry, balance = (positions.contacts.key, positions.fn), (contacts.key, force[:, 0])
         evidence = replace(
             solution.evidence[k],
             position_agreement=_correlate(geometry, balance), overlap_agreement=_correlate(motion, balance),
         )  # fmt: skip
-        key, one, two = align(*motion, *geometry)
         truth = true[k][0], true[k][1][:, 0]
-        r = [_correlate((key, (1.0 - w) * one + w * two), truth) for w in WEIGHTS]
-        found.append((position_weight_terms(evidence), np.array(r)))
+        fields = [frame.fn, *mixed_forces(sequence, frame, positions, motion_reliability(evidence), WEIGHTS[1:])]
+        r = np.array([_correlate((frame.contacts.key, fn), truth) for fn in fields])
+        found.append((position_weight_terms(evidence), r, _correlate(geometry, truth)))
     return found
+
+
+def mixed_forces(
+    sequence: CorrectedSequence, frame: FrameForces, positions: FramePosterior, reliability: float, weights: Array
+) -> list[Array]:
+    """Mix a motion estimate, solved with its members kept, as a run does.
+
+    Returns f_n (c,) [N] of the mixture of every weight, on the contacts of the frame.
+    """
+    assert frame.member_force is not None
+    problem = pose_frame(
+        SequenceProblem(sequence.packing, sequence.snapshots, sequence.settings), frame.frame,
+        SequenceState.first(sequence.packing),
+    )  # fmt: skip
+    balanced = FrameBalance(
+        frame.contacts, problem.snapshot.position, assemble_frame_balance(problem, frame.contacts),
+        problem.settings.ensemble.convex, problem.packing.scale_is_known, any(problem.packing.material.gravity),
+    )  # fmt: skip
+    fn_sd, ft_sd = np.nanstd(frame.member_force, axis=1).T
+    motion = ForceEstimate(frame.fn, frame.ft, fn_sd, ft_sd)
+    return [
+        mix_in_equilibrium(balanced, motion, positions, reliability, position_weight=float(weight)).fn
+        for weight in weights
+    ]
 
 
 def _correlate(one: tuple[Keys, Array], two: tuple[Keys, Array]) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 import pytest
+from rodsight.solver.mixture import equilibrium_mixture
 from rodsight.solver.sequence import estimate as estimates
 from rodsight.solver.sequence.frames import solve_sequence
 from rodsight.solver.sequence.settings import SequenceSettings
@@ -26,12 +27,12 @@ def test_projected_mixture_keeps_the_sum_of_the_motion(monkeypatch: pytest.Monke
         return mixed
 
     def factors(*arguments):
-        used.append(estimates_factors(*arguments))
+        used.append(true_factors(*arguments))
         return used[-1]
 
-    estimates_factors = estimates.stress_factors
+    true_factors = equilibrium_mixture.stress_factors
     monkeypatch.setattr(estimates, "_mix", spy)
-    monkeypatch.setattr(estimates, "stress_factors", factors)
+    monkeypatch.setattr(equilibrium_mixture, "stress_factors", factors)
     list(solve_sequence(sheared.packing, sheared.snapshots, SequenceSettings(positions="always")))
     assert len(sums) > 2
     assert np.abs(np.array(sums) - 1.0).max() < 2e-3
