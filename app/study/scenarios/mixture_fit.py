@@ -46,7 +46,7 @@ from ...solver.sequence.state import SequenceState
 from ...solver.statistics.agreement import pearson
 from ...synthetic.scenarios.preset_names import ScenarioName
 from ...synthetic.scenarios.scenario_folder import make_scenario
-from .scenario_score import ScenarioSolution, StudyPlan, solve_scenario, true_forces
+from .scenario_score import ScenarioSolution, StudyPlan, correct_scenario, solve_scenario, true_forces
 
 ALONE = "solver.positions=never", "solver.keep_members=true"
 FIRST, STRIDE = 1, 2  # of the frames that are read
@@ -94,6 +94,8 @@ def sample_mixtures(
                 made = make_scenario(
                     Path(folder), name, seed, grains=plan.grains, cache=plan.folder / "kept", progress=progress
                 )
+                if correct_scenario(load_experiment(made.folder, plan.settings)).settings.soft:
+                    continue  # a run takes overlaps for forces, and weighs them so
                 experiment = load_experiment(made.folder, motion.settings)
                 solution = solve_scenario(experiment, progress)
             except (InputError, UnbalancedError):
@@ -137,8 +139,9 @@ def print_mixture(console: Console, sample: MixtureSample) -> None:
         weight[away] = expit(sample.select(away).terms @ fit_weight(sample.select(~away)))
     rows = {
         "motion alone": sample.r[:, 0], "positions alone": sample.positions, "the better of both": sample.better,
-        "the best weight": sample.r.max(axis=1), "fitted": sample.reached(expit(sample.terms @ coefficients)),
-        "fitted, kinds left out in turn": sample.reached(weight),
+        "the mixture of a run": _mixed(sample), "the best weight": sample.r.max(axis=1),
+        "fitted anew": sample.reached(expit(sample.terms @ coefficients)), "fitted anew, kinds left out in turn":
+        sample.reached(weight),
     }  # fmt: skip
     for name, r in rows.items():
         lost = sample.better - r
@@ -149,11 +152,16 @@ def print_mixture(console: Console, sample: MixtureSample) -> None:
         )  # fmt: skip
 
 
-def _print_kinds(console: Console, sample: MixtureSample) -> None:
-    """Print the mean r of both parts and of their mixture with the weights of fitted.toml, of every kind."""
+def _mixed(sample: MixtureSample) -> Array:
+    """Return the correlations (f,) of the mixtures of a run, with the weights of fitted.toml."""
     table = FITTED["position_weight"]
     weight = expit(sample.terms @ np.array([table[name] for name in WEIGHT_TERMS]))
-    mixed = sample.reached(np.where(weight < LEAST_WEIGHT, 0.0, weight))
+    return sample.reached(np.where(weight < LEAST_WEIGHT, 0.0, weight))
+
+
+def _print_kinds(console: Console, sample: MixtureSample) -> None:
+    """Print the mean r of both parts and of their mixture with the weights of fitted.toml, of every kind."""
+    mixed = _mixed(sample)
     rows, worse = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0)), []
     for heading in ("kind", "motion", "positions", "mixture", "loss against the better"):
         rows.add_column(heading, justify="left" if heading == "kind" else "right")
@@ -176,7 +184,7 @@ def _print_kinds(console: Console, sample: MixtureSample) -> None:
 def _mix_frames(solution: ScenarioSolution, true: Sequence[tuple[Keys, Array]]) -> list[tuple[Array, Array, float]]:
     """Terms (t,) and correlations (11,) of the frames of hard grains under a known load, and of positions alone."""
     sequence, found = solution.sequence, []
-    if sequence.settings.soft or not sequence.packing.scale_is_known:
+    if not sequence.packing.scale_is_known:
         return []
     estimates = PositionEstimates(sequence.packing, sequence.snapshots, sequence.settings.posterior, 1)
     for k in range(FIRST, len(solution.unchecked), STRIDE):
@@ -189,7 +197,8 @@ def _mix_frames(solution: ScenarioSolution, true: Sequence[tuple[Keys, Array]]) 
         geometry, balance = (positions.contacts.key, positions.fn), (contacts.key, force[:, 0])
         evidence = replace(
             solution.evidence[k],
-            position_agreement=_correlate(geometry, balance), overlap_agreement=_correlate(motion, balance),
+            agreement=_correlate(motion, geometry), position_agreement=_correlate(geometry, balance),
+            overlap_agreement=_correlate(motion, balance),
         )  # fmt: skip
         truth = true[k][0], true[k][1][:, 0]
         fields = [frame.fn, *mixed_forces(sequence, frame, positions, motion_reliability(evidence), WEIGHTS[1:])]
