@@ -56,9 +56,16 @@ MUTANTS = [
         ("pearson(moved[:, 0], both[:, 0])", "pearson(moved[:, 0], both[:, 2])"),
     ),
     *mutants_of(
-        "solver/sequence/estimate.py",
+        "solver/mixture/equilibrium_mixture.py",
         "tests/solver/sequence/test_mixed_total.py",
-        ("total = float(estimate.fn.sum())", "total = None"),
+        ("total = float(motion.fn.sum())", "total = None"),
+        ("if not frame.weighty:", "if frame.weighty:"),
+    ),
+    *mutants_of(
+        "app/study/scenarios/mixture_fit.py",
+        "tests/app/study/test_mixture_fit.py",
+        ("best - r + PRICE", "r - best + PRICE"),
+        ("found[0] -= found[1:] @ middle[1:]", "found[0] -= 0.0"),
     ),
     *mutants_of(
         "solver/mixture/soft_grains.py",
