@@ -59,7 +59,7 @@ MUTANTS = [
         "solver/mixture/equilibrium_mixture.py",
         "tests/solver/sequence/test_mixed_total.py",
         ("total = float(motion.fn.sum())", "total = None"),
-        ("if not frame.weighty:", "if frame.weighty:"),
+        ("if not frame.has_weight:", "if frame.has_weight:"),
     ),
     *mutants_of(
         "app/study/scenarios/mixture_fit.py",
