@@ -94,6 +94,23 @@ def test_rod_on_an_incline_rolls_or_slides_as_friction_allows(degrees: float, sl
     assert vx == pytest.approx(acceleration * steps * cell.time_step, rel=1e-2)
 
 
+@pytest.mark.parametrize("ratio", [0.1, 0.3])
+def test_slip_that_friction_holds_decays_with_the_damping_ratio_of_the_normal(ratio: float) -> None:
+    gravity = 100.0
+    settings = replace(HELD, gravity=(0.0, -gravity), damping_ratio=ratio, time_step_factor=0.02)
+    radius = np.array([0.008])
+    mass = settings.density * settings.length * np.pi * radius[0] ** 2
+    rest = radius[0] - mass * gravity / settings.normal_stiffness
+    start = np.array([[1e-3, 0.0, 0.0]])
+    cell = ShearCell(radius, np.array([[0.1, rest]]), FrameSize(1.0, 0.5), settings, velocity=start)
+    # A third of the mass resists the slip of a solid rod, which also turns.
+    frequency = np.sqrt(3.0 * settings.stiffness_ratio * settings.normal_stiffness / mass)
+    half = np.pi / (frequency * np.sqrt(1.0 - ratio**2))
+    cell.run(np.zeros(round(half / cell.time_step)))
+    slip = cell.velocity[0, 0] + radius[0] * cell.velocity[0, 2]
+    assert slip / start[0, 0] == pytest.approx(-np.exp(-ratio * frequency * half), rel=2e-2)
+
+
 def test_rod_that_slides_to_the_right_drags_the_bottom_to_the_right() -> None:
     settings = replace(HELD, gravity=(0.0, -9.81))
     cell = ShearCell(
