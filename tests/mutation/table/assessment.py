@@ -166,6 +166,7 @@ MUTANTS = [
             "np.where(contacts.with_wall[bearing], 8.0**0.5, 2.0)",
         ),
         ("np.mean(slide_sd**2) - 1.0", "np.mean(slide_sd**2)"),
+        ("_sliding_over_noise(slid[held], slide_sd[held])", "np.inf"),
         ("max(variance - expected, 0.0)", "variance"),
         ("after - motion.interval * moving.velocity", "after - moving.velocity"),
         ("(beside & (out > 0.0)).any(axis=1)", "(out > 0.0).any(axis=1)"),

@@ -61,6 +61,17 @@ def test_the_signal_is_the_sliding_over_its_noise_less_the_noise(lattice):
     assert np.isnan([none.slide_signal, none.sliding, none.gap_error]).all()
 
 
+def test_a_rod_that_rolls_freely_is_no_signal_of_sliding(lattice):
+    """It bears nothing, and its sliding shows no force; of a packing at rest it would be nearly all of the signal."""
+    _, snapshot, _, contacts = lattice
+    motion = rolling(snapshot, 0.0)
+    free = int(contacts.i[0])
+    motion.grains.spin[free] = 1e3 * NOISE / RADIUS / INTERVAL
+    touched = (contacts.i == free) | (contacts.j == free)
+    assert measure(lattice, motion).slide_signal > 10.0
+    assert measure(lattice, motion, fn=np.where(touched, 0.05, 1.0)).slide_signal == 0.0
+
+
 def test_the_error_of_gaps_is_that_of_strong_contacts_without_noise(lattice):
     _, snapshot, _, contacts = lattice
     rng, error = np.random.default_rng(3), 2e-5
