@@ -75,7 +75,7 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
     if scale:
         lines.append(f"Scale of all forces: standard deviation {100 * np.median(scale):.0f} % (median over frames).")
     if summary.get("weight") and not summary["loaded_walls"]:
-        lines.append(f"No wall has a given load: the weight of the rods, {summary['weight']:.3g} N, sets the scale.")
+        lines.append(weight_line(summary))
     elif not summary["loaded_walls"]:
         lines.append(
             "[bold]No wall has a given pressure:[/] forces are known up to a scale, which differs between frames."
@@ -177,6 +177,18 @@ def load_line(load: dict[str, Any]) -> str:
         return f"Load on '{wall}', measured: {force:.4g} N in the mean ({low:.4g} to {high:.4g} N).{part}"
     parts = f"{load['pressure'] / 1e3:.4g} kPa × {load['width']:.4g} m × {load['length']:.3g} m"
     return f"Load on '{wall}': {parts} = {force:.4g} N; it sets the scale of all forces.{part}"
+
+
+def weight_line(summary: dict[str, Any]) -> str:
+    """State the weight of the rods, and which walls add a force that is not given to it."""
+    weight = f"No wall has a given load: the weight of the rods, {summary['weight']:.3g} N, sets the scale"
+    added = [f"'{escape(wall)}' {ratio:.2g} times" for wall, ratio in summary.get("walls_above", {}).items()]
+    if not added:
+        return f"{weight}."
+    return (
+        f"{weight}, but walls above press on them with a force that is not given ({', '.join(added)} the weight, by "
+        "these forces): only sliding determines it. Give their load."
+    )
 
 
 def _penalty_line(summary: dict[str, Any]) -> list[str]:

@@ -19,10 +19,13 @@ from ..solver.bodies.walls import Walls
 from ..solver.frame_forces import ERROR_PARTS, FrameForces, FrameStatus
 from ..solver.statistics.agreement import Agreement
 from ..solver.statistics.frame_statistics import FrameStatistics
-from ..tracks import TrackStatus
+from ..tracks import TrackStatus, WallTracks
 from .calibration_summary import calibration_facts, camera_facts
 from .results import Results
 from .truth import accuracy
+
+ABOVE = 0.5  # outward normal along the vertical, from which on a wall is above the packing
+ADDED = 0.1  # of the weight
 
 
 class _Frame(NamedTuple):
@@ -61,11 +64,15 @@ class _Statistics(NamedTuple):
     coordination_number: float
     mean_fn: float
     deviations: Float[np.ndarray, " d"]  # of DEVIATION
+    wall_force: Float[np.ndarray, "w 2"]  # [N]
 
     @classmethod
     def of(cls, statistics: FrameStatistics) -> _Statistics:
         deviations = np.array([getattr(statistics, f"{name}_sd") for name in CONSTANT])
-        return cls(statistics.friction_angle, statistics.coordination_number, statistics.mean_fn, deviations)
+        return cls(
+            statistics.friction_angle, statistics.coordination_number, statistics.mean_fn, deviations,
+            statistics.wall_force,
+        )  # fmt: skip
 
 
 def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: dict[str, float]) -> dict[str, Any]:
@@ -88,6 +95,7 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
     trust = np.array([frame.trust for frame in frames])
     solved = [frame for frame in frames if frame.status is not FrameStatus.FAILED]
     worst = max(solved or frames, key=lambda frame: frame.unbalance)
+    weight = _weight(results)
     summary: dict[str, Any] = {
         "name": results.name,
         "frame_count": len(frames),
@@ -128,7 +136,8 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "error_budget": _error_budget(frames),
         "fn_deviation": _plain([frame.fn_deviation for frame in frames]),
         "loads": _loads(results),
-        "weight": _weight(results),
+        "weight": float(np.linalg.norm(weight)) if weight.any() else None,
+        "walls_above": press_from_above(results.walls, np.array([each.wall_force for each in statistics]), weight),
         "diagnosis": [each.as_plain() for each in results.diagnosis],
         "friction": _friction(results),
         "base_friction": results.base_friction,
@@ -229,11 +238,32 @@ def _loads(results: Results) -> list[dict[str, Any]]:
     return found
 
 
-def _weight(results: Results) -> float | None:
-    """Return the weight of all rods [N]; None without gravity."""
+def _weight(results: Results) -> Float[np.ndarray, "2"]:
+    """Return the weight of all rods [N]; zero without gravity."""
     x, y = _material(results).get("gravity", (0.0, 0.0))
-    total = results.grains.weight((float(x), float(y))).sum(axis=0)
-    return float(np.linalg.norm(total)) if total.any() else None
+    return results.grains.weight((float(x), float(y))).sum(axis=0)
+
+
+def press_from_above(
+    walls: WallTracks, force: Float[np.ndarray, "f w 2"], weight: Float[np.ndarray, "2"]
+) -> dict[str, float]:
+    """Return, by name of a wall above the packing without a given load, its median force down over the weight [N].
+
+    The weight alone does not set the scale of the forces where such a wall adds any force to it. Walls that add less
+    than ADDED are left out. force [N]: of the packing on the walls.
+    """
+    size = float(np.linalg.norm(weight))
+    if not size > 0.0 or walls.count == 0:
+        return {}
+    up = -weight / size
+    first = Walls.at_rest(walls.endpoints[0], side=walls.side)
+    above = (first.outward @ up > ABOVE) & ~first.curved & ~walls.loaded
+    lifted = force @ up
+    solved = lifted[np.isfinite(lifted).all(axis=1)]
+    if len(solved) == 0:
+        return {}
+    pressed = np.median(solved, axis=0) / size
+    return {walls.name[w]: float(pressed[w]) for w in np.flatnonzero(above & (pressed > ADDED))}
 
 
 def _material(results: Results) -> dict[str, Any]:

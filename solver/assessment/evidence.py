@@ -40,4 +40,6 @@ class Evidence:
     agreement_age: int = 0  # frames since these three were computed
     force_change: float = math.nan  # 1 − correlation of f_n with the previous frame, over the contacts of either
     power_gap: float = math.nan  # of the convex members: 0 if all friction acts at its limit against the sliding
+    # Relative standard deviation of the sums of f_n among the members, where weight alone sets the scale; else NaN.
+    scale_disagreement: float = math.nan
     inertial_number: float = math.nan  # of the step by the times of its photographs; NaN: no load is stated

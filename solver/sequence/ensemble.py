@@ -127,6 +127,12 @@ class EnsembleForces:
         size = float(np.linalg.norm(self.fn))
         return float(np.linalg.norm(_weighted_sd(self.member_fn, self.weight))) / size if size > 0 else 0.0
 
+    @property
+    def scale_disagreement(self) -> float:
+        """Standard deviation of the sums of f_n among the members over that of the field; 0 where none bears force."""
+        total = float(self.fn.sum())
+        return float(_weighted_sd(self.member_fn.sum(axis=1)[:, None], self.weight)[0]) / total if total > 0 else 0.0
+
 
 def solve_ensemble(
     problem: FrameProblem,

@@ -76,6 +76,7 @@ class Estimate:
     threshold: float = 0.0  # [m] of the gap, of a single chain
     missing: MissingContacts = NO_MISSING  # pairs that were not detected but that the balance shows
     balance: Balance | None = None  # of the ensemble; None: of a single chain
+    scale_disagreement: float = np.nan  # relative standard deviation of the sum of f_n among the members
 
     @property
     def contacts(self) -> Contacts:
@@ -295,6 +296,7 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
         force_change=_force_change(estimate, state),
         inertial_number=_inertial_number(problem, load),
         power_gap=estimate.power_gap,
+        scale_disagreement=estimate.scale_disagreement if not load > 0.0 and packing.scale_is_known else np.nan,
     )
 
 
@@ -387,4 +389,5 @@ def _estimate_by_ensemble(problem: FrameProblem, state: SequenceState, positions
         found.remark, found.fn_sd, found.ft_sd, found.member_force if problem.settings.keep_members else None,
         found.cone_fraction(friction), found.seen_slip, found.disagreement, found.start_difference,
         missing=found.missing, power_gap=found.power_gap, balance=found.balance,
+        scale_disagreement=found.scale_disagreement,
     )  # fmt: skip

@@ -177,8 +177,13 @@ def _errors_with_force(frame: FrameForces, mean: float) -> Array:
 
 
 def _scale_errors(frame: FrameForces) -> Array:
-    """Standard deviations (c, 2) [N] by the scale that all forces share; those of soft grains were fitted with it."""
+    """Standard deviations (c, 2) [N] by the scale that all forces share.
+
+    Those of soft grains were fitted with it, and those of the first frame contain FIRST_SCALE.
+    """
     relative = 0.0 if frame.soft or math.isnan(frame.scale_sd) else frame.scale_sd
+    if frame.frame == 0:
+        relative = math.sqrt(max(relative**2 - FIRST_SCALE**2, 0.0))
     return relative * np.abs(np.column_stack([frame.fn, frame.ft]))
 
 

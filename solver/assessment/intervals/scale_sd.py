@@ -11,6 +11,7 @@ from ..fitted import FITTED
 
 TABLE = FITTED["scale_sd"]
 LEAST: float = TABLE["least"]
+WITHOUT_MOTION: float = FITTED["force_intervals"]["first_scale"]
 # Evidence that the scale is uncertain, by the name of its factor in fitted.toml; NaN: not known.
 TERMS: dict[str, Callable[[Evidence], float]] = {
     "per_load": lambda e: abs(math.log(e.load_fraction)) if e.load_fraction > 0.0 else 0.0,
@@ -32,17 +33,22 @@ def scale_sd(evidence: Evidence) -> float:
     Returns
     -------
     float
-        NaN where the frame is not assessed.
+        NaN where the frame is not assessed: a single chain, or a frame whose positions were not used.
 
     Notes
     -----
+    Of a frame to which no motion leads, the fitted error common to all of its forces. Otherwise
     σ² = a² + (b ln q)² + (c ε)² + (d p)² + (e (1 − r)/(1 + r))² + (f I)²: q the mean stress of the field over that of
     the loads, ε the correction of the measured motion, p the power gap, r the expected correlation and I the inertial
     number. Wrong input makes part of the load vanish, so that q is far from 1; an anisotropic stress does so, too, and
-    widens σ without need. Fitted on simulated packings (fitted.toml).
+    widens σ without need. Fitted on simulated packings (fitted.toml). Where weight alone sets the scale, a wall that
+    presses on the packing may add any force: the standard deviation of the scale among the ensemble members is added.
     """
+    members = 0.0 if math.isnan(evidence.scale_disagreement) else evidence.scale_disagreement
+    if not evidence.assessed:
+        return math.nan if math.isnan(evidence.mixed_trust) else math.hypot(WITHOUT_MOTION, members)
     terms = scale_terms(evidence)
-    return math.hypot(LEAST, *(TABLE[name] * each for name, each in zip(TERMS, terms, strict=True)))
+    return math.hypot(LEAST, members, *(TABLE[name] * each for name, each in zip(TERMS, terms, strict=True)))
 
 
 def scale_terms(evidence: Evidence) -> list[float]:

@@ -193,6 +193,17 @@ def test_the_ensemble_has_a_disagreement_and_a_single_chain_has_none():
         assert np.isnan(state.evidence.disagreement)
 
 
+def test_members_may_disagree_on_the_scale_where_weight_alone_sets_it():
+    loaded, snapshots = sheared_frames(2)
+    heavy = replace(
+        loaded, pressure=np.full(len(loaded.pressure), np.nan), material=Material(0.25, 0.25, 0, (0, -9.81))
+    )
+    assert np.isfinite(loaded.pressure).any()
+    found = [run(each, snapshots, ENSEMBLE)[1][1].evidence.scale_disagreement for each in (loaded, heavy)]
+    assert np.isnan(found[0])
+    assert found[1] > 0
+
+
 def test_a_frame_reports_the_penalty_for_unseen_rods():
     packing, snapshots = sheared_frames(2)
     for inferred in (0, 2):

@@ -146,6 +146,15 @@ def test_uncertain_contacts_and_the_first_frame_have_errors_proportional_to_the_
     assert first**2 - before**2 == pytest.approx((FIRST_SCALE * frame.fn[-1] / mean) ** 2)
 
 
+def test_the_scale_of_the_first_frame_counts_once(frame):
+    first = calibrate_sd(replace(frame, frame=0))
+    same, twice = (
+        calibrate_sd(replace(frame, frame=0, scale_sd=each)) for each in (FIRST_SCALE, 5.0**0.5 * FIRST_SCALE)
+    )
+    assert same.fn_sd == pytest.approx(first.fn_sd)
+    assert twice.fn_sd**2 - first.fn_sd**2 == pytest.approx((2.0 * FIRST_SCALE * frame.fn) ** 2)
+
+
 def test_intervals_of_the_first_frame_widen_with_its_friction(frame):
     first = replace(frame, frame=0)
     assert (source_of_frame(first), source_of_frame(frame)) == (EvidenceSource.FIRST, EvidenceSource.MOTION)

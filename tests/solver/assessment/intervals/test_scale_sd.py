@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 from rodsight.solver.assessment.expected_correlation import expect_correlation
+from rodsight.solver.assessment.intervals.force_intervals import FIRST_SCALE
 from rodsight.solver.assessment.intervals.scale_sd import TABLE, scale_sd
 
 from ..test_penalties import ASSESSED
@@ -35,5 +36,16 @@ def test_what_contradicts_the_forces_makes_their_scale_uncertain(worse):
     assert scale_sd(replace(CARRIED, **worse)) > scale_sd(replace(CARRIED, correction=0.05, power_gap=0.02))
 
 
-def test_a_frame_that_is_not_assessed_has_no_scale():
-    assert math.isnan(scale_sd(replace(ASSESSED, assessed=False)))
+def test_members_that_disagree_on_the_scale_make_it_uncertain():
+    """Known only where the weight sets the scale, to which a wall may add any force."""
+    known = scale_sd(ASSESSED)
+    assert scale_sd(replace(ASSESSED, scale_disagreement=1.2)) == pytest.approx(math.hypot(known, 1.2))
+    assert scale_sd(replace(ASSESSED, scale_disagreement=0.0)) == known
+
+
+def test_the_scale_of_the_first_frame_has_the_error_that_its_forces_share():
+    first = replace(ASSESSED, assessed=False)
+    assert math.isnan(scale_sd(first))
+    assert scale_sd(replace(first, mixed_trust=0.9)) == FIRST_SCALE > scale_sd(ASSESSED)
+    disputed = replace(first, mixed_trust=0.9, scale_disagreement=2.0 * FIRST_SCALE)
+    assert scale_sd(disputed) == pytest.approx(5.0**0.5 * FIRST_SCALE)
