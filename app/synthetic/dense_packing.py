@@ -99,17 +99,19 @@ def prepare_packing(
     frictionless = replace(settings, friction=0.0, wall_friction=0.0)
     soft = replace(frictionless, normal_stiffness=SOFTENING * settings.normal_stiffness, pressure=float("nan"))
 
-    def place(settings: DemSettings, at: Array, height: float, drag: float = 0.0) -> ShearCell:
+    def place(
+        settings: DemSettings, at: Array, height: float, drag: float = 0.0, axis: Array | None = None
+    ) -> ShearCell:
         frame = FrameSize(width, height, corner_radius=corner_radius)
-        return ShearCell(radius, at, frame, settings, drag=drag)
+        return ShearCell(radius, at, frame, settings, drag=drag, axis=axis)
 
     cell = place(soft, position, height, SOFT_DRAG)
     cell.run(np.zeros(SOFT_STEPS))
     loading = settings if loose else frictionless
-    cell = place(loading, cell.position, height, LOADING_DRAG)
+    cell = place(loading, cell.position, height, LOADING_DRAG, cell.axis)
     stiffness = max(settings.normal_stiffness / USUAL_STIFFNESS, 1.0)  # a step is shorter by its root
     for _ in range(round(LOADING_ROUNDS * (stiffness * max(count / ROUNDS_OF, 1.0)) ** 0.5)):
         cell.run(np.zeros(LOADING_STEPS))
         if cell.unbalance < PREPARED and cell.plate_unbalance < PREPARED:
-            return place(settings, cell.position, cell.height)
+            return place(settings, cell.position, cell.height, axis=cell.axis)
     raise UnbalancedError(f"the packing of {count} rods did not come to rest: unbalance {cell.unbalance:.2g}")

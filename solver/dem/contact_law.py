@@ -24,6 +24,7 @@ class Law(NamedTuple):
     wall_friction: float
     rolling_friction: float  # greatest rolling moment over f_n and the rolling radius
     adhesion: float  # [N], attraction of closed contacts
+    ovality: float  # e of elliptic sections with semi-axes R (1 ± e)
     drag: float  # [1/s], preparation only
     gravity_x: float  # [m/s²]
     gravity_y: float
@@ -72,21 +73,29 @@ def rolling_force(fn: float, rolling: float, damping: float, spring: float, law:
 
 
 @njit(cache=True)
-def add_pair_force(force: Array, radius: Array, i: int, j: int, nx: float, ny: float, fn: float, ft: float) -> None:
-    """Add f_n, f_t [N] of a contact between grains with normal n from i to j to the forces on both (n, 3)."""
+def add_pair_force(
+    force: Array, arms: tuple[float, float, float, float], i: int, j: int, nx: float, ny: float, fn: float, ft: float
+) -> None:
+    """Add f_n, f_t [N] of a contact between grains with normal n from i to j to the forces on both (n, 3).
+
+    arms [m]: of f_t about i and j, then of f_n, which vanish for round sections.
+    """
     fx = fn * nx - ft * ny
     fy = fn * ny + ft * nx
     force[j, 0] += fx
     force[j, 1] += fy
-    force[j, 2] -= radius[j] * ft
+    force[j, 2] -= arms[1] * ft - arms[3] * fn
     force[i, 0] -= fx
     force[i, 1] -= fy
-    force[i, 2] -= radius[i] * ft
+    force[i, 2] -= arms[0] * ft - arms[2] * fn
 
 
 @njit(cache=True)
-def add_wall_force(force: Array, radius: Array, i: int, nx: float, ny: float, fn: float, ft: float) -> None:
-    """Add f_n, f_t [N] of a contact with normal n from grain i to a wall to the force on the grain (n, 3)."""
+def add_wall_force(force: Array, arms: tuple[float, float], i: int, nx: float, ny: float, fn: float, ft: float) -> None:
+    """Add f_n, f_t [N] of a contact with normal n from grain i to a wall to the force on the grain (n, 3).
+
+    arms [m]: of f_t and of f_n.
+    """
     force[i, 0] -= fn * nx - ft * ny
     force[i, 1] -= fn * ny + ft * nx
-    force[i, 2] -= radius[i] * ft
+    force[i, 2] -= arms[0] * ft - arms[1] * fn

@@ -12,6 +12,7 @@ from ..bodies.wall_shapes import Sides
 
 WALL_NAMES = ("bottom", "right", "top", "left")
 STABLE_DAMPING = 0.14  # greatest damping ratio × time step factor: at 0.17 packings were unstable
+GREATEST_OVALITY = 0.15  # contacts are computed to first order in it; errors of normals grow with its square
 
 
 class UnbalancedError(ArithmeticError):
@@ -30,6 +31,7 @@ class DemSettings:
     base_friction: float = 0.0  # [m/s²] coefficient × 9.81 of a base on which the rods lie; 0: none
     friction_spread: float = 0.0  # contacts between grains have friction (1 ± this) times the mean, by pairs of grains
     adhesion: float = 0.0  # [N], attraction of closed contacts
+    ovality: float = 0.0  # e of elliptic sections with semi-axes R (1 ± e), between flat walls
     pressure: float = 50e3  # [Pa] on the plate; NaN: the plate is held
     gravity: tuple[float, float] = (0.0, 0.0)  # [m/s²]
     normal_stiffness: float = 2e7  # [N/m]
@@ -54,11 +56,14 @@ class DemSettings:
             "base_friction",
             "friction_spread",
             "adhesion",
+            "ovality",
             "damping_ratio",
             "plate_damping",
         ):
             if not getattr(self, name) >= 0.0:
                 raise ValueError(f"{name} must not be negative, not {getattr(self, name)}")
+        if not self.ovality <= GREATEST_OVALITY:
+            raise ValueError(f"ovality must be at most {GREATEST_OVALITY}, not {self.ovality}")
         if not 0.0 < self.time_step_factor <= 0.4:
             raise ValueError(f"time_step_factor must be in (0, 0.4], not {self.time_step_factor}")
         if self.damping_ratio * self.time_step_factor > STABLE_DAMPING:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..bodies.grains import Array
+from .boundaries import Boundary
 from .dem_truth import DemSettings
 from .shear_cell import FrameSize, ShearCell
 
@@ -30,6 +31,10 @@ class MembraneCell(ShearCell):
     def sides(self) -> None:
         """Shapes of the walls: all are straight."""
         return None
+
+    @staticmethod
+    def _flat_walls(boundary: Boundary) -> bool:
+        return False  # the membrane follows the rods
 
     def _find_neighbours(self) -> None:
         super()._find_neighbours()

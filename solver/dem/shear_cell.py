@@ -63,6 +63,7 @@ class ShearCell(Simulation):
         *,
         velocity: Array | None = None,
         drag: float = 0.0,
+        axis: Array | None = None,
     ) -> None:
         """Place grains in a rectangular frame.
 
@@ -80,6 +81,8 @@ class ShearCell(Simulation):
             Velocities and spins [m/s, m/s, rad/s]; at rest by default.
         drag
             Damping rate of every grain [1/s], for the preparation of a packing only.
+        axis : (n,), optional
+            Directions of the greatest radii of elliptic sections [rad]; random by default.
         """
         width, height = frame.width, frame.height
         grains = Grains.of_rods(radius, density=settings.density, length=settings.length)
@@ -88,7 +91,7 @@ class ShearCell(Simulation):
             plate_constants(grains, settings, height, np.nan),
         ])  # fmt: skip
         boundary = Boundary(FRAME, np.array([0.0, height, 0.0, width, 0.0, frame.corner_radius]), plates, np.zeros(4))
-        super().__init__(grains, position, boundary, settings=settings, velocity=velocity, drag=drag)
+        super().__init__(grains, position, boundary, settings=settings, velocity=velocity, drag=drag, axis=axis)
         self._side_length = SIDE_MARGIN * height
         self._span = width if frame.span is None else frame.span
 
@@ -184,6 +187,10 @@ class ShearCell(Simulation):
         disc = self.endpoints[pairs.j[on_disc]]
         _, normal = wall_distance(disc, np.full(len(disc), OUT), self.position[pairs.i[on_disc]])
         return force + float(pairs.fn[on_disc] @ normal[:, 1] + pairs.ft[on_disc] @ normal[:, 0])
+
+    @staticmethod
+    def _flat_walls(boundary: Boundary) -> bool:
+        return bool(boundary.state[DISC_RADIUS] == 0.0)
 
     def _load_residual(self, row: int, wall: int) -> float:
         load = float(self._boundary.plates[row, LOAD])

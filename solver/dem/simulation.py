@@ -39,11 +39,20 @@ class Simulation(ABC):
         settings: DemSettings,
         velocity: Array | None = None,
         drag: float = 0.0,
+        axis: Array | None = None,
     ) -> None:
         """Place grains at position (n, 2) [m] with velocity (n, 3) [m/s, m/s, rad/s], at rest by default.
 
-        drag [1/s] slows every grain: for the preparation of a packing only.
+        drag [1/s] slows every grain: for the preparation of a packing only. axis (n,) [rad]: directions of the greatest
+        radii of elliptic sections, random by default.
+
+        Raises
+        ------
+        ValueError
+            The sections are elliptic and a wall is not flat.
         """
+        if settings.ovality > 0.0 and not self._flat_walls(boundary):
+            raise ValueError("elliptic sections are simulated between flat walls only")
         n = grains.count
         self.settings = settings
         self.grains = grains
@@ -58,6 +67,7 @@ class Simulation(ABC):
         self._bodies = DemBodies(
             state, np.zeros((n, 3)), grains.radius, grains.mass, np.zeros((n, 3)), base_limit,
             np.maximum(1.0 + np.sqrt(2.0) * settings.friction_spread * sign, 0.0), np.zeros((n, 2)),
+            np.random.default_rng(n).uniform(0.0, np.pi, n) if axis is None else axis.copy(),
         )  # fmt: skip
         self._law = Law(
             time_step=self.time_step,
@@ -69,6 +79,7 @@ class Simulation(ABC):
             wall_friction=settings.wall_friction,
             rolling_friction=settings.rolling_friction,
             adhesion=settings.adhesion,
+            ovality=settings.ovality,
             drag=drag,
             gravity_x=settings.gravity[0],
             gravity_y=settings.gravity[1],
@@ -82,6 +93,11 @@ class Simulation(ABC):
     def position(self) -> Array:
         """Centres (n, 2) [m], not wrapped into a cell."""
         return self._bodies.state[:, :2].copy()
+
+    @property
+    def axis(self) -> Array:
+        """Directions of the greatest radii of elliptic sections (n,) [rad]."""
+        return self._bodies.axis + self._bodies.state[:, 2]
 
     @property
     def velocity(self) -> Array:
@@ -225,6 +241,16 @@ class Simulation(ABC):
             profile[:] = 1.0
         self.run(displacement / self.time_step * profile[:, None] / profile.sum())
 
+    @property
+    def _greatest_radius(self) -> Array:
+        """Radii (n,) [m] of the circles around the sections, whatever their rotations."""
+        return self.grains.radius * (1.0 + self.settings.ovality)
+
+    @staticmethod
+    def _flat_walls(boundary: Boundary) -> bool:
+        """Whether every wall is a straight bar."""
+        return False
+
     def _find_neighbours(self) -> None:
         mass = self.grains.mass
         i, j, image = self._pair_neighbours()
@@ -235,7 +261,7 @@ class Simulation(ABC):
 
     def _pair_neighbours(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
         """Return pairs i < j of grains that may touch before the next search, and the images (p, 2) of j."""
-        position, radius = self.position, self.grains.radius
+        position, radius = self.position, self._greatest_radius
         pairs = KDTree(position).query_pairs(2.0 * radius.max() + self._skin, output_type="ndarray")
         i, j = pairs.min(axis=1), pairs.max(axis=1)
         near = np.linalg.norm(position[j] - position[i], axis=1) < radius[i] + radius[j] + self._skin
@@ -243,7 +269,7 @@ class Simulation(ABC):
 
     def _wall_neighbours(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return grains and walls that may touch before the next search."""
-        i, wall = np.nonzero(self._wall_distance(self.position) < self.grains.radius[:, None] + self._skin)
+        i, wall = np.nonzero(self._wall_distance(self.position) < self._greatest_radius[:, None] + self._skin)
         return i, wall
 
     @abstractmethod

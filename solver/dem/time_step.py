@@ -34,6 +34,7 @@ from .boundaries import (
     wall_surface,
 )
 from .contact_law import Law, add_pair_force, add_wall_force, contact_force, rolling_force
+from .elliptic_section import elliptic_radius, tilted_normal
 
 X, Y, THETA, VX, VY, OMEGA = range(6)  # columns of the state of the grains
 # Greatest moment of a disc on its base over friction and radius, for a uniform pressure.
@@ -45,12 +46,13 @@ class DemBodies(NamedTuple):
 
     state: Array  # (n, 6) x, y [m], θ [rad], vx, vy [m/s] and ω [rad/s] half a step earlier
     force: Array  # (n, 3) fx, fy [N], torque [N m] of the last step
-    radius: Array  # (n,) [m]
+    radius: Array  # (n,) [m], the mean one of elliptic sections
     mass: Array  # (n,) [kg]
     base: Array  # (n, 3) springs of the base friction: fx, fy [N], moment over the radius [N]
     base_limit: Array  # (n,) [N], greatest friction of the base
     roughness: Array  # (n,) the friction of a contact is the mean of both grains' times the law's
     external: Array  # (n, 2) [N] further forces, as of a membrane
+    axis: Array  # (n,) [rad] direction of the greatest radius at rotation zero, of elliptic sections
 
 
 class DemPairs(NamedTuple):
@@ -124,9 +126,9 @@ def move_grains(bodies: DemBodies, law: Law, shear: float, stretch: float) -> fl
 def grain_forces(
     bodies: DemBodies, pairs: DemPairs, law: Law, boundary: Boundary, shear: float, stretch: float
 ) -> float:
-    """Add the forces between grains to `bodies.force`; return Σ f_n |branch vector| [N m]."""
+    """Add the forces between grains to `bodies.force`; return Σ f_n |branch vector| [N m], of round rods."""
     state, force, radius, cell = bodies.state, bodies.force, bodies.radius, boundary.state
-    periodic, rolls = boundary.kind == CELL, law.rolling_friction > 0.0
+    periodic, rolls, oval = boundary.kind == CELL, law.rolling_friction > 0.0, law.ovality > 0.0
     work = 0.0
     for p in range(pairs.i.shape[0]):
         i, j = pairs.i[p], pairs.j[p]
@@ -135,30 +137,44 @@ def grain_forces(
         if periodic:
             dx = dx + pairs.image[p, 0] * cell[AX] + pairs.image[p, 1] * cell[BX]
             dy = dy + pairs.image[p, 0] * cell[AY] + pairs.image[p, 1] * cell[BY]
-        touch = radius[i] + radius[j]
+        widest = (1.0 + law.ovality) * (radius[i] + radius[j])
         square = dx * dx + dy * dy
-        if square >= touch * touch:
+        if square >= widest * widest:
             open_contact(pairs, p)
             continue
         distance = np.sqrt(square)
         nx, ny = dx / distance, dy / distance
+        # Arms of f_t and of f_n; the latter vanish for round sections.
+        arm_i, arm_j, slope_i, slope_j = float(radius[i]), float(radius[j]), 0.0, 0.0
+        overlap = arm_i + arm_j - distance
+        if oval:
+            arm_i, slope_i = elliptic_radius(arm_i, law.ovality, bodies.axis[i] + state[i, THETA], nx, ny)
+            arm_j, slope_j = elliptic_radius(arm_j, law.ovality, bodies.axis[j] + state[j, THETA], nx, ny)
+            if distance >= arm_i + arm_j:
+                open_contact(pairs, p)
+                continue
+            overlap = arm_i + arm_j - distance
+            nx, ny, cosine = tilted_normal(nx, ny, (slope_i + slope_j) / distance)
+            overlap /= cosine
+            arm_i, arm_j = cosine * arm_i, cosine * arm_j
+            slope_i, slope_j = cosine * slope_i, cosine * slope_j
         dvx = state[j, VX] - state[i, VX]
         dvy = state[j, VY] - state[i, VY]
         if periodic:
             dvx = dvx + stretch * dx + shear * dy
             dvy = dvy + stretch * dy
-        un = nx * dvx + ny * dvy
-        ut = nx * dvy - ny * dvx - radius[i] * state[i, OMEGA] - radius[j] * state[j, OMEGA]
+        un = nx * dvx + ny * dvy + (slope_i * state[i, OMEGA] + slope_j * state[j, OMEGA])
+        ut = nx * dvy - ny * dvx - arm_i * state[i, OMEGA] - arm_j * state[j, OMEGA]
         fn, ft, pairs.spring[p] = contact_force(
-            touch - distance, un, ut, pairs.damping[p], pairs.spring[p],
+            overlap, un, ut, pairs.damping[p], pairs.spring[p],
             float(0.5 * (bodies.roughness[i] + bodies.roughness[j]) * law.friction), law,
         )  # fmt: skip
         pairs.fn[p] = fn
         pairs.ft[p] = ft
-        add_pair_force(force, radius, i, j, nx, ny, fn, ft)
+        add_pair_force(force, (arm_i, arm_j, slope_i, slope_j), i, j, nx, ny, fn, ft)
         work += fn * distance
         if rolls:
-            arm = radius[i] * radius[j] / touch
+            arm = radius[i] * radius[j] / (radius[i] + radius[j])
             rolling = arm * (state[j, OMEGA] - state[i, OMEGA])
             moment, pairs.roll[p] = rolling_force(fn + law.adhesion, rolling, pairs.damping[p], pairs.roll[p], law)
             force[j, 2] += arm * moment
@@ -168,7 +184,7 @@ def grain_forces(
 
 @njit(cache=True)
 def wall_forces(bodies: DemBodies, pairs: DemPairs, law: Law, boundary: Boundary, drive: Array) -> tuple[float, float]:
-    """Add the forces of the walls to `bodies.force`.
+    """Add the forces of the walls to `bodies.force`; beside elliptic sections they are flat.
 
     Return the sums of the forces [N] normal to plate and right side of a frame; on the ring or the plate of a box, and
     zero. The discs of the plate are part of it.
@@ -181,18 +197,21 @@ def wall_forces(bodies: DemBodies, pairs: DemPairs, law: Law, boundary: Boundary
     for p in range(pairs.i.shape[0]):
         i, wall = pairs.i[p], pairs.j[p]
         distance, nx, ny, wx, wy, spin = wall_surface(boundary, drive, linkage, wall, state[i, X], state[i, Y])
-        if distance >= radius[i]:
+        arm, slope = float(radius[i]), 0.0
+        if law.ovality > 0.0:
+            arm, slope = elliptic_radius(arm, law.ovality, bodies.axis[i] + state[i, THETA], nx, ny)
+        if distance >= arm:
             open_contact(pairs, p)
             continue
         dvx, dvy = wx - state[i, VX], wy - state[i, VY]
-        un = nx * dvx + ny * dvy
-        ut = nx * dvy - ny * dvx - radius[i] * state[i, OMEGA]
+        un = nx * dvx + ny * dvy + slope * state[i, OMEGA]
+        ut = nx * dvy - ny * dvx - arm * state[i, OMEGA]
         fn, ft, pairs.spring[p] = contact_force(
-            float(radius[i] - distance), un, ut, pairs.damping[p], pairs.spring[p], law.wall_friction, law
+            float(arm - distance), un, ut, pairs.damping[p], pairs.spring[p], law.wall_friction, law
         )
         pairs.fn[p] = fn
         pairs.ft[p] = ft
-        add_wall_force(force, radius, i, nx, ny, fn, ft)
+        add_wall_force(force, (arm, slope), i, nx, ny, fn, ft)
         if law.rolling_friction > 0.0:
             rolling = radius[i] * (spin - state[i, OMEGA])
             moment, pairs.roll[p] = rolling_force(fn + law.adhesion, rolling, pairs.damping[p], pairs.roll[p], law)

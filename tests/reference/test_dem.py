@@ -14,13 +14,15 @@ pytestmark = pytest.mark.unit
 ROUNDING = 1e-9
 STEPS = 40
 SIDE = 6  # grains along a side
+OVALITY = 5e-3  # changes the radii by less than the overlaps, so that all branches are reached
 LAW = Law(
     time_step=2e-6, normal_stiffness=2e7, tangential_stiffness=1.4e7, tangential_damping=0.48, friction=0.25,
-    wall_friction=0.1, rolling_friction=0.05, adhesion=7.0, drag=40.0, gravity_x=0.8, gravity_y=-9.81,
+    wall_friction=0.1, rolling_friction=0.05, adhesion=7.0, ovality=0.0, drag=40.0, gravity_x=0.8,
+    gravity_y=-9.81,
 )  # fmt: skip
 
 
-def make_cell(load: float, side_load: float = np.nan):
+def make_cell(load: float, side_load: float = np.nan, law: Law = LAW):
     """Compiled bodies and pairs, and the plain cell, of the same overlapping, fast grains in a slanted frame.
 
     Some of the grains rub on a base. Loads [N] on the plate and on the right side, NaN: driven.
@@ -40,7 +42,8 @@ def make_cell(load: float, side_load: float = np.nan):
     base_limit = rng.choice([0.0, 3.0, 400.0], n)
     roughness = np.random.default_rng(6).choice([0.5, 1.0, 1.6], n)
     external = np.random.default_rng(7).normal(0.0, 40.0, (n, 2))
-    bodies = DemBodies(state, np.zeros((n, 3)), radius, mass, np.zeros((n, 3)), base_limit, roughness, external)
+    axis = np.random.default_rng(8).uniform(0.0, np.pi, n)
+    bodies = DemBodies(state, np.zeros((n, 3)), radius, mass, np.zeros((n, 3)), base_limit, roughness, external, axis)
     near = [(i, j) for i in range(n) for j in range(i + 1, n) if np.hypot(*(position[j] - position[i])) < 0.0163]
     rows = {0: range(SIDE), 1: range(SIDE - 1, n, SIDE), 2: range(n - SIDE, n), 3: range(0, n, SIDE)}
     walls = sorted((i, w) for w, grains in rows.items() for i in grains)
@@ -56,8 +59,8 @@ def make_cell(load: float, side_load: float = np.nan):
     plain = PlainCell(
         position.copy(), state[:, 2].copy(), velocity.copy(), spin.copy(), np.zeros((n, 2)), np.zeros(n), radius, mass,
         shear, height, -0.3, width, 0.4, None if np.isnan(load) else load, 80.0, 0.2,
-        None if np.isnan(side_load) else (0.3, side_load, 60.0), base_limit, roughness, external, LAW, near, walls,
-        damping,
+        None if np.isnan(side_load) else (0.3, side_load, 60.0), base_limit, roughness, external, axis, law,
+        near, walls, damping,
     )  # fmt: skip
     return bodies, pair_list, wall_list, boundary, plain
 
@@ -74,11 +77,14 @@ def make_drive():
     )
 
 
-@pytest.mark.parametrize(("load", "side_load"), [(300.0, np.nan), (np.nan, 250.0)])
-def test_the_step_is_the_plain_one(load, side_load):
-    bodies, pairs, walls, boundary, plain = make_cell(load, side_load)
+@pytest.mark.parametrize(
+    ("load", "side_load", "ovality"), [(300.0, np.nan, 0.0), (np.nan, 250.0, 0.0), (300.0, 250.0, OVALITY)]
+)
+def test_the_step_is_the_plain_one(load, side_load, ovality):
+    law = LAW._replace(ovality=ovality)
+    bodies, pairs, walls, boundary, plain = make_cell(load, side_load, law)
     drive = make_drive()
-    assert advance(bodies, pairs, walls, LAW, boundary, drive, np.inf) == STEPS
+    assert advance(bodies, pairs, walls, law, boundary, drive, np.inf) == STEPS
     for each in drive:
         plain.step(*each)
     assert bodies.state[:, :2] == close_to(plain.position)
@@ -98,8 +104,9 @@ def test_the_step_is_the_plain_one(load, side_load):
         assert found.roll == close_to([plain.roll[each] for each in key])
 
 
-def test_the_cell_reaches_every_branch():
-    *_, plain = make_cell(300.0)
+@pytest.mark.parametrize("ovality", [0.0, OVALITY])
+def test_the_cell_reaches_every_branch(ovality):
+    *_, plain = make_cell(300.0, law=LAW._replace(ovality=ovality))
     for each in make_drive():
         plain.step(*each)
     for kind in ("pair", "wall"):

@@ -8,7 +8,7 @@ from rodsight.solver.dem.time_step import DemBodies, DemPairs, advance
 
 pytestmark = pytest.mark.unit
 
-LAW = Law(1e-4, 2e4, 1.4e4, 0.5, 0.25, 0.25, 0.0, 0.0, 3.0, 0.0, 0.0)
+LAW = Law(1e-4, 2e4, 1.4e4, 0.5, 0.25, 0.25, 0.0, 0.0, 0.0, 3.0, 0.0, 0.0)
 REQUIRED, VISCOSITY, LENGTH = 5e3, 2e5, 0.06  # [Pa], [Pa s], [m]
 NO_WALLS = DemPairs(*np.empty((2, 0), np.int32), np.empty((0, 2), np.int64), *np.empty((5, 0)))
 RATE = 0.8  # [1/s]
@@ -30,8 +30,9 @@ def make_bodies() -> tuple[DemBodies, DemPairs, Boundary]:
         CELL, np.array([*cell.ravel(), 4e3, 0.0]), np.zeros((2, 3)), np.array([REQUIRED, VISCOSITY, 10.0, LENGTH])
     )
     bodies = DemBodies(
-        state, rng.normal(0, 1, (3, 3)), radius, mass, np.zeros((3, 3)), np.zeros(3), np.ones(3), np.zeros((3, 2))
-    )
+        state, rng.normal(0, 1, (3, 3)), radius, mass, np.zeros((3, 3)), np.zeros(3), np.ones(3), np.zeros((3, 2)),
+        rng.uniform(0.0, np.pi, 3),
+    )  # fmt: skip
     return bodies, pairs, boundary
 
 

@@ -13,7 +13,8 @@ pytestmark = pytest.mark.unit
 ROUNDING = 1e-11
 LAW = Law(
     time_step=2e-6, normal_stiffness=2e7, tangential_stiffness=1.4e7, tangential_damping=0.48, friction=0.25,
-    wall_friction=0.1, rolling_friction=0.0, adhesion=0.0, drag=0.0, gravity_x=0.0, gravity_y=0.0,
+    wall_friction=0.1, rolling_friction=0.0, adhesion=0.0, ovality=0.0, drag=0.0, gravity_x=0.0,
+    gravity_y=0.0,
 )  # fmt: skip
 CIRCLES = np.array([0.1, -0.4, 0.04, 0.003, -0.002, 0.7])
 DRIVE = np.array([0.3, -0.2, 12.0, 0.0])
@@ -29,7 +30,9 @@ def test_forces_of_circles_are_the_plain_ones():
     place = away[:, None] * unit + np.where(at_ring[:, None], 0.0, CIRCLES[3:5])
     state = np.column_stack([place, rng.normal(0, 1, (n, 2)), rng.normal(0, 0.5, n), rng.normal(0, 40.0, n)])
     empty = np.zeros((n, 3))
-    bodies = DemBodies(state, empty.copy(), radius, np.full(n, 0.03), empty, np.zeros(n), np.ones(n), np.zeros((n, 2)))
+    bodies = DemBodies(
+        state, empty.copy(), radius, np.full(n, 0.03), empty, np.zeros(n), np.ones(n), np.zeros((n, 2)), np.zeros(n)
+    )
     boundary = Boundary(RING, CIRCLES, np.zeros((2, 3)), np.zeros(4))
     wall, damping = np.where(at_ring, 0, 1).astype(np.int32), rng.choice([1.0, 200.0, 900.0], n)
     image = np.zeros((n, 2), np.int64)

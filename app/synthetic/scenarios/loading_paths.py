@@ -199,7 +199,11 @@ def _prepare(loading: LoadingPath, grains: int, rng: np.random.Generator) -> She
     if loading.motion in (shear, shear_cyclically):
         return cell
     packed = ShearCell(
-        cell.grains.radius, cell.position, FrameSize(cell.width, cell.height, SPAN * cell.width), loading.settings
+        cell.grains.radius,
+        cell.position,
+        FrameSize(cell.width, cell.height, SPAN * cell.width),
+        loading.settings,
+        axis=cell.axis,
     )
     packed.rest()
     if not (loading.plates or loading.measured):
@@ -216,6 +220,7 @@ def _prepare_heap(loading: LoadingPath, grains: int, rng: np.random.Generator) -
         cell.position,
         FrameSize(cell.width, BOX_HEIGHT * cell.height, SPAN * cell.width),
         loading.settings,
+        axis=cell.axis,
     )
     return rested(heap)
 

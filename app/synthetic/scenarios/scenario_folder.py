@@ -16,6 +16,7 @@ from ...solver.dem import (
     boundaries,
     box_cell,
     contact_law,
+    elliptic_section,
     membrane_cell,
     periodic_cell,
     ring_cell,
@@ -149,7 +150,16 @@ def _fingerprint(loading: LoadingPath) -> str:
     """Return a name that changes with the loading path and with the code that simulates it."""
     values = replace(loading, motion=None, sizes=None)  # type: ignore[arg-type]
     digest = hashlib.sha256(f"{values} {loading.sizes.__name__}".encode())
-    modules = [contact_law, boundaries, time_step, simulation, shear_cell, dense_packing, loading_paths]
+    modules = [
+        contact_law,
+        elliptic_section,
+        boundaries,
+        time_step,
+        simulation,
+        shear_cell,
+        dense_packing,
+        loading_paths,
+    ]
     if loading.periodic:
         modules += [periodic_cell, periodic_packing]
     if loading.bed:

@@ -290,6 +290,8 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
         _sheared(inertial_number=2e-2, moving=True, unbalance_limit=10.0),
     ),
     "rolling": _missing("sheared; rolling resistance of .1", _sheared(rolling_friction=0.1)),
+    "elliptic": _missing("sheared; sections elliptic by ±5 %, stated as round", _sheared(ovality=0.05)),
+    "slightly_elliptic": _missing("sheared; sections elliptic by ±1 %, stated as round", _sheared(ovality=0.01)),
     "sizes_10": _missing("sheared; radii 1:10", replace(MOVED, sizes=_choose_ten)),
     "time_reversed": _wrong("photographs in reverse order", reverse_time),
     "shuffled": _wrong("photographs in random order", shuffle_frames),

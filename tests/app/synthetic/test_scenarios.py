@@ -20,7 +20,7 @@ from rodsight.solver.contacts.contacts import measure_contacts
 from rodsight.solver.dem.box_cell import BOX_NAMES
 from rodsight.solver.dem.dem_truth import DemTruth
 from rodsight.solver.statistics.balance import resultant_norms
-from rodsight.synthetic.dense_packing import WIDE_RADII, choose_two_radii, choose_wide_radii
+from rodsight.synthetic.dense_packing import RADIUS_CLASSES, WIDE_RADII, choose_two_radii, choose_wide_radii
 from rodsight.synthetic.scenarios import departures
 from rodsight.synthetic.scenarios.bed_paths import simulate_bed
 from rodsight.synthetic.scenarios.loading_paths import simulate_loading
@@ -153,6 +153,20 @@ def test_rods_at_a_membrane_are_stated_as_boundary_beside_the_walls(tmp_path: Pa
     assert len(stated) < FEW / 2
     right = truth.position[0, stated, 0].mean()
     assert right > np.median(truth.position[0, :, 0])
+
+
+def test_elliptic_rods_are_stated_as_round() -> None:
+    truth = truth_of("elliptic")
+    assert truth.settings.ovality == 0.05
+    stated = observe_truth(truth, ("top",), 0.0, np.random.default_rng(0))
+    np.testing.assert_array_equal(np.unique(stated.radius), RADIUS_CLASSES)  # the mean ones
+    grains = Grains.of_rods(truth.radius, density=truth.settings.density, length=truth.settings.length)
+    rows = slice(truth.offset[0], truth.offset[1])
+    gap = measure_contacts(
+        grains, truth.position[0], Walls.at_rest(truth.endpoints[0]), truth.i[rows], truth.j[rows]
+    ).gap
+    # Of a pair the gap of mean radii varies as the sum of two waves, each of standard deviation e R / √2.
+    assert gap[truth.j[rows] < FEW].std() == pytest.approx(0.05 * truth.radius.mean(), rel=0.3)
 
 
 @pytest.mark.thorough

@@ -9,6 +9,7 @@ from rodsight.solver.bodies.grains import Array
 from rodsight.solver.dem.contact_law import Law
 
 SIDES = ("bottom", "right", "top", "left")
+TINY = 1e-40  # step of complex derivatives: nothing is subtracted, so that no digits are lost
 
 
 @dataclass
@@ -35,6 +36,7 @@ class PlainCell:
     base_limit: Array  # (n,) [N]
     roughness: Array  # (n,) factor of the friction between grains
     external: Array  # (n, 2) [N] further forces
+    axis: Array  # (n,) [rad] directions of the greatest radii at angle zero
     law: Law
     pairs: list[tuple[int, int]]
     wall_pairs: list[tuple[int, int]]
@@ -66,14 +68,14 @@ class PlainCell:
         self.height += dt * self.rise
         self.width += dt * self.spread
         for i, j in self.pairs:
-            apart = self.position[j] - self.position[i]
-            distance = float(np.hypot(*apart))
-            normal = apart / distance
-            self._touch("pair", i, j, normal, distance - self.radius[i] - self.radius[j], self.velocity[j])
+            self._touch("pair", i, j, *self._pair_surfaces(i, j), self.velocity[j])
         push, side_push = 0.0, 0.0
         for i, w in self.wall_pairs:
             outward, distance, velocity, wall_spin = self._wall(w, self.position[i], rate)
-            self._touch("wall", i, w, outward, distance - self.radius[i], velocity, wall_spin)
+            direction = float(np.arctan2(outward[1], outward[0]))
+            radius = self._reach(i, direction, 0.0).real
+            slope = self._reach(i, direction + 1j * TINY, 0.0).imag / TINY
+            self._touch("wall", i, w, outward, distance - radius, ((radius, slope), (0.0, 0.0)), velocity, wall_spin)
             push += self.contact["wall", i, w][0] if SIDES[w] == "top" else 0.0
             side_push += self.contact["wall", i, w][0] if SIDES[w] == "right" else 0.0
         for k in range(len(self.mass)):
@@ -89,6 +91,36 @@ class PlainCell:
             self.spread += dt * (side_push - load - damping * self.spread) / mass
         wall_speed = (abs(self.rise) + abs(rate) * self.height) / np.cos(self.shear) ** 2 + abs(self.spread)
         return dt * (fastest + max(fastest, wall_speed))
+
+    def _reach(self, k: int, direction: complex, turn: complex) -> complex:
+        """Radius of grain k in a direction [rad] when it has turned by a further angle [rad]."""
+        beyond = direction - self.angle[k] - turn - self.axis[k]
+        return complex(self.radius[k] * (1.0 + self.law.ovality * np.cos(2.0 * beyond)))
+
+    def _pair_surfaces(self, i: int, j: int) -> tuple[Array, float, tuple[tuple[float, float], tuple[float, float]]]:
+        """Normal, gap [m] and the arms [m] of f_t and f_n about both grains, from the gap's derivatives.
+
+        The gap g depends on the displacement of j and on the rotations of both grains; forces are along its gradient.
+        Derivatives are those of the complex step, exact to rounding (Squire & Trapp 1998).
+        """
+        apart = self.position[j] - self.position[i]
+        direction = float(np.arctan2(apart[1], apart[0]))
+        distance = float(np.hypot(*apart))
+
+        def gap(dx: complex, dy: complex, turn_i: complex, turn_j: complex) -> complex:
+            along = distance + np.cos(direction) * dx + np.sin(direction) * dy
+            across = np.cos(direction) * dy - np.sin(direction) * dx
+            turned = direction + np.arctan(across / along)
+            opposite = turned + np.pi  # the point in the view of j
+            reach = self._reach(i, turned, turn_i) + self._reach(j, opposite, turn_j)
+            return complex(np.sqrt(along**2 + across**2) - reach)
+
+        slope = [gap(*step).imag / TINY for step in 1j * TINY * np.eye(4)]
+        steepness = float(np.hypot(slope[0], slope[1]))
+        normal = np.array(slope[:2]) / steepness
+        first, second = self._reach(i, direction, 0.0).real, self._reach(j, direction + np.pi, 0.0).real
+        arms = ((first / steepness, slope[2] / steepness), (second / steepness, slope[3] / steepness))
+        return normal, gap(0.0, 0.0, 0.0, 0.0).real * steepness, arms
 
     def _rub(self, k: int) -> None:
         """Friction of the base on grain k: a spring and a dashpot against sliding, another against rotation."""
@@ -129,11 +161,19 @@ class PlainCell:
         return outward, float((foot - place) @ outward), velocity, -rate
 
     def _touch(
-        self, kind: str, i: int, j: int, normal: Array, gap: float, velocity: Array, wall_spin: float = 0.0
+        self,
+        kind: str,
+        i: int,
+        j: int,
+        normal: Array,
+        gap: float,
+        arms: tuple[tuple[float, float], tuple[float, float]],
+        velocity: Array,
+        wall_spin: float = 0.0,
     ) -> None:
         """Spring, dashpot and friction of one contact; velocity [m/s] is that of the other body's centre or surface.
 
-        wall_spin [rad/s]: spin of a wall.
+        arms [m]: of f_t and of f_n about i and about j. wall_spin [rad/s]: spin of a wall.
         """
         key, law = (kind, i, j), self.law
         if gap >= 0.0:
@@ -141,8 +181,9 @@ class PlainCell:
             self.spring[key], self.roll[key], self.contact[key] = 0.0, 0.0, (0.0, 0.0)
             return
         tangent = np.array([-normal[1], normal[0]])
-        surface = self.velocity[i] + self.spin[i] * self.radius[i] * tangent
-        other = velocity - self.spin[j] * self.radius[j] * tangent if kind == "pair" else velocity
+        (along_i, across_i), (along_j, across_j) = arms
+        surface = self.velocity[i] + self.spin[i] * (along_i * tangent - across_i * normal)
+        other = velocity - self.spin[j] * (along_j * tangent - across_j * normal) if kind == "pair" else velocity
         un, ut = float(normal @ (other - surface)), float(tangent @ (other - surface))
         damping = self.damping[key]
         fn = -law.normal_stiffness * gap - damping * un
@@ -164,10 +205,10 @@ class PlainCell:
         self.spring[key], self.contact[key] = spring, (fn, ft)
         force = fn * normal + ft * tangent
         self.force[i] -= force
-        self.torque[i] -= self.radius[i] * ft
+        self.torque[i] += across_i * fn - along_i * ft
         if kind == "pair":
             self.force[j] += force
-            self.torque[j] -= self.radius[j] * ft
+            self.torque[j] += across_j * fn - along_j * ft
         arm = self.radius[i] * (self.radius[j] / (self.radius[i] + self.radius[j]) if kind == "pair" else 1.0)
         rotational_slip = arm * ((self.spin[j] if kind == "pair" else wall_spin) - self.spin[i])
         elastic = self.roll.get(key, 0.0) - law.tangential_stiffness * rotational_slip * law.time_step
