@@ -12,7 +12,12 @@ from rodsight.solver.nlgs.sweeping.kernels import (
     measure_natural_map,
     measure_state,
 )
-from rodsight.solver.nlgs.sweeping.measured_sweeps import advance_and_measure, equilibrium_shape, find_equilibrium
+from rodsight.solver.nlgs.sweeping.measured_sweeps import (
+    advance_and_measure,
+    equilibrium_shape,
+    find_equilibrium,
+    greatest_force_residual,
+)
 from rodsight.solver.nlgs.sweeping.ordering import GROUP, visiting_order
 
 from tests.reference.twins.ordering import plain_order
@@ -90,6 +95,17 @@ def equilibrium_of(problem):
     equilibrium = np.empty(equilibrium_shape(len(problem.body)))
     find_equilibrium(problem, equilibrium)
     return equilibrium
+
+
+def test_the_worst_force_residual_is_found_at_any_grain(case):
+    problem = case.assemble()
+    equilibrium = equilibrium_of(problem)
+    for g in np.flatnonzero(problem.body[:, 3] > 0.0)[[0, 1, -2, -1]]:
+        body = problem.body.copy()
+        body[:, :2] = equilibrium[:, :2].transpose(0, 2, 1).reshape(-1, 2)[: len(body)]
+        body[g, 0] += 3.0 * body[g, 3]
+        body[g, 1] -= 4.0 * body[g, 3]
+        assert greatest_force_residual(equilibrium, body) == pytest.approx(5.0, rel=ROUNDING)
 
 
 @pytest.mark.parametrize("relaxation", [1.0, 1.4])

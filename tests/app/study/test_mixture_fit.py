@@ -19,9 +19,9 @@ COUNT = 120
 def _sample(seed: int) -> tuple[MixtureSample, np.ndarray]:
     """Make frames whose best weight follows from two of the terms, and those weights."""
     rng = np.random.default_rng(seed)
-    terms = rng.normal(0.0, 1.0, (COUNT, len(WEIGHT_TERMS)))
+    terms = rng.normal(2.0, 1.0, (COUNT, len(WEIGHT_TERMS)))
     terms[:, 0] = 1.0
-    best = expit(0.5 + 1.5 * terms[:, 1] - terms[:, 3])
+    best = expit(0.5 + 1.5 * (terms[:, 1] - 2.0) - (terms[:, 3] - 2.0))
     r = 0.97 - 0.2 * (WEIGHTS - best[:, None]) ** 2
     return MixtureSample(np.where(rng.random(COUNT) < 0.5, "shear", "biaxial"), terms, r, r[:, -1]), best
 

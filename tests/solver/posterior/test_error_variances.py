@@ -7,9 +7,12 @@ from rodsight.solver.posterior.error_variances import ErrorVariances, estimate_e
 from tests.packings import box
 
 
-def lattice(side: int = 30) -> Contacts:
+def lattice(side: int = 30, angle: float = 0.0) -> Contacts:
+    """Contacts of a triangular lattice, turned by an angle [rad]."""
     rows = np.arange(side)
     position = np.array([(1.0 * column + 0.5 * (row % 2), np.sqrt(0.75) * row) for row in rows for column in rows])
+    cos, sin = np.cos(angle), np.sin(angle)
+    position = position @ np.array([[cos, sin], [-sin, cos]]) + [side * sin, 0.0]
     grains = Grains(np.full(len(position), 0.5), np.ones(len(position)))
     return detect_contacts(grains, position, np.ones(len(position), bool), box(99.0, 99.0), 0.01, wall_threshold=-9.0)
 
@@ -30,6 +33,14 @@ def test_variances_of_radii_and_centres_are_separated(radius_sd: float, centre_s
     found = estimate_error_variances(frames, lasting=lasting)
     assert np.sqrt(found.radius) == pytest.approx(radius_sd, abs=0.12)
     assert np.sqrt(found.centre) == pytest.approx(centre_sd, abs=0.08)
+
+
+def test_errors_of_centres_are_found_from_gaps_in_two_oblique_directions() -> None:
+    contacts, rng = lattice(angle=np.deg2rad(15.0)), np.random.default_rng(4)
+    contacts = contacts.select(np.flatnonzero(contacts.normal.prod(axis=1) > 0.0))  # at 15 and 75, not at 135 degrees
+    gap = make_gaps(contacts, np.zeros(contacts.grain_count), 1.0, rng)
+    found = estimate_error_variances([(contacts, gap, np.ones(contacts.count))])
+    assert np.sqrt(found.centre) == pytest.approx(1.0, abs=0.08)
 
 
 def test_overlap_common_to_the_gaps_of_a_grain_is_no_radius_error() -> None:

@@ -10,6 +10,8 @@ from rodsight.solver.assessment.trust import INFERRED_PENALTY, unseen_penalty
 from rodsight.solver.bodies.grains import Grains
 from rodsight.solver.bodies.motion import LastSeen, Snapshot, motion_to
 from rodsight.solver.bodies.packing import Material, Packing
+from rodsight.solver.contacts.contacts import detect_contacts
+from rodsight.solver.contacts.pairs import are_among
 from rodsight.solver.contacts.verdicts import Verdicts
 from rodsight.solver.frame_forces import FrameStatus
 from rodsight.solver.nlgs.chain import ChainSettings
@@ -19,6 +21,7 @@ from rodsight.solver.sequence import ensemble
 from rodsight.solver.sequence.frames import SequencePart, solve_sequence
 from rodsight.solver.sequence.settings import SequenceSettings
 from rodsight.solver.sequence.state import SequenceState
+from rodsight.solver.statistics.bearing import bearing_probability
 
 from tests.packings import LENGTH, squeezed_heap
 
@@ -280,6 +283,21 @@ def test_a_pair_confirmed_by_a_reviewer_is_certain_whatever_its_gaps():
     ((frame, state),) = run(packing, snapshots, ENSEMBLE, part=SequencePart(2, [before]), verdicts=verdicts)
     assert state.members.pairs.of(uncertain) == 1.0
     assert frame.probability[frame.contacts.key == uncertain] == detected.probability.min()  # as detected
+
+
+def test_a_pair_added_by_a_reviewer_counts_as_bearing():
+    packing, snapshots = sheared_frames(3)
+    detected, before = solved_heap(ENSEMBLE, 3)[2][0].contacts.key, solved_heap(ENSEMBLE, 3)[1][1]
+    now, reach = snapshots[2], 0.5 * packing.grains.radius.mean()
+    near = detect_contacts(packing.grains, now.position, now.present, packing.walls_of(now), reach)
+    open_pairs = near.select(np.flatnonzero(~are_among(near.key, detected)))
+    added = open_pairs.key[np.argsort(open_pairs.gap)[:8]]
+    ((frame, _),) = run(
+        packing, snapshots, ENSEMBLE, part=SequencePart(2, [before]), verdicts={2: Verdicts(forced=added)}
+    )
+    row = are_among(frame.contacts.key, added) & (frame.probability == 0.0) & (frame.fn > 0.01 * frame.fn.mean())
+    assert row.any()
+    assert (frame.bearing_probability[row] == bearing_probability(frame.fn, np.ones_like(frame.fn))[row]).all()
 
 
 def test_only_the_ensemble_compares_two_starts():

@@ -8,7 +8,7 @@ from rodsight.solver.contacts.contacts import ContactSource
 from rodsight.solver.contacts.verdicts import Verdicts
 from rodsight.solver.detection.refinement import RefinedBlock
 from rodsight.solver.sequence.frames import solve_sequence
-from rodsight.solver.sequence.missing_contacts import NO_MISSING, MissingContacts
+from rodsight.solver.sequence.missing_contacts import NO_MISSING, MissingContacts, find_missing_contacts
 
 from tests.solver.sequence.test_frames import ENSEMBLE, sheared_frames
 
@@ -56,9 +56,17 @@ def test_a_missed_strong_contact_is_recovered_and_reported(sound, monkeypatch):
     assert "the balance shows" in frame.reason
 
 
-def test_a_contact_excluded_by_a_reviewer_stays_excluded(sound):
-    key = strongest(sound[FRAME])
+def test_a_contact_excluded_by_a_reviewer_stays_excluded(sound, monkeypatch):
+    key, offered = strongest(sound[FRAME]), []
+
+    def offer(*arguments):
+        found = find_missing_contacts(*arguments)
+        offered.append(found.key)
+        return found
+
+    monkeypatch.setattr("rodsight.solver.sequence.ensemble.find_missing_contacts", offer)
     frame = solve({FRAME: Verdicts(forbidden=np.array([key]))})[FRAME]
+    assert key not in np.concatenate(offered)  # where it would take the place of pairs that may touch
     row = frame.contacts.key == key
     assert row.any()
     assert (frame.source[row] == ContactSource.FORBIDDEN_BY_REVIEWER).all()

@@ -148,3 +148,10 @@ def test_by_default_a_link_lies_within_45_degrees():
 
     assert zigzag(47) == 1
     assert zigzag(43) == 0
+
+    def bent(steep):  # a column bears much, a branch of it little: σ₁ of the common grain is 84° from the horizontal
+        force = in_file(0, 1, 2, force=100.0) | in_file(2, 3, 4, force=20.0)
+        return chains_of(path([0.3, 0.3], 90, 90, steep, steep), force, idle=28).length.tolist()
+
+    assert bent(42) == [5]
+    assert bent(38) == [3]

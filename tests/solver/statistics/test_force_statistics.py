@@ -172,7 +172,7 @@ def test_statistics_are_over_bearing_contacts():
     fn[open_rows] = 0.0
     sliding = np.zeros_like(fn)
     sliding[np.flatnonzero(fn > 0)[:3]] = 1.0
-    probabilities = ContactProbabilities((fn > 0).astype(float), sliding)
+    probabilities = ContactProbabilities(np.where(fn > 0, 1.0, 0.3), sliding)  # without force none is a bearing one
     found = statistics_of(contacts, fn, np.zeros_like(fn), position, walls, probabilities)
     bearing = fn > 0
     assert found.contact_count == bearing.sum() == len(fn) - 2
