@@ -144,12 +144,10 @@ def assemble(
     of_wall = j[rows_wall] - n
     carrier, along_normal, along_tangent = walls.plate_components(of_wall, contacts.normal[rows_wall])
     wall_body = np.stack([i[rows_wall], carrier], axis=1)
-    wall_w, plate_w = compliance[wall_body[:, 0]], plate[carrier, 1]
     velocity = walls.velocity_at(of_wall, point[rows_wall])
     wall = np.column_stack([
         contacts.normal[rows_wall],
-        _inverse(wall_w + along_normal**2 * plate_w),
-        _inverse(3.0 * wall_w + along_tangent**2 * plate_w),
+        *_effective_impedances(body, plate, wall_body, along_normal, along_tangent),
         np.einsum("ij,ij->i", velocity, contacts.normal[rows_wall]) + closing[rows_wall],
         np.einsum("ij,ij->i", velocity, contacts.tangent[rows_wall]),
         along_normal,
@@ -180,9 +178,7 @@ def with_impedance(
     first, second = problem.pair_body[:, 0], problem.pair_body[:, 1]
     # Zero are rows of padding, and of two bodies with imposed motion.
     pair[:, 2] = np.where(pair[:, 2] > 0.0, _inverse(compliance[first] + compliance[second]), 0.0)
-    wall_w, plate_w = compliance[problem.wall_body[:, 0]], plate[problem.wall_body[:, 1], 1]
-    wall[:, 2] = _inverse(wall_w + wall[:, 6] ** 2 * plate_w)
-    wall[:, 3] = _inverse(3.0 * wall_w + wall[:, 7] ** 2 * plate_w)
+    wall[:, 2], wall[:, 3] = _effective_impedances(body, plate, problem.wall_body, wall[:, 6], wall[:, 7])
     return problem._replace(body=body, plate=plate, pair=pair, wall=wall, external=weight)
 
 
@@ -208,6 +204,14 @@ def _free_motion(
         plate[walls.loaded, 0] = -walls.load[walls.loaded] * plate_compliance
         plate[walls.loaded, 1] = plate_compliance
     return body, plate, weight
+
+
+def _effective_impedances(
+    body: Array, plate: Array, wall_body: NDArray[np.int64], along_normal: Array, along_tangent: Array
+) -> tuple[Array, Array]:
+    """Normal and tangential force over a change of relative velocity (c,) [N s/m], of contacts with walls."""
+    grain_w, plate_w = body[wall_body[:, 0], 3], plate[wall_body[:, 1], 1]
+    return _inverse(grain_w + along_normal**2 * plate_w), _inverse(3.0 * grain_w + along_tangent**2 * plate_w)
 
 
 def _inverse(value: Array) -> Array:
