@@ -14,10 +14,10 @@ import pytest
 import rodsight
 from hypothesis import HealthCheck, Phase, settings
 from playwright.sync_api import Browser, Page, expect, sync_playwright
-from rodsight.compilation.ahead import KernelsAhead
 from rodsight.synthetic.synthesis import SynthesisSettings, synthesize
 
 from tests.browser import FLAGS, SECONDS, SEEN, find_chromium
+from tests.kernels import compile_missing_kernels
 from tests.scheduling import rank_of, schedule_by_folder
 from tests.shapes import check_shapes
 from tests.sharing import made_once
@@ -126,9 +126,7 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_setupnodes() -> None:
     """Compile missing kernels once, before the processes of the tests would each compile them."""
-    kernels = KernelsAhead()
-    with kernels.compiling(("",), all_uses=True):
-        kernels.wait("")
+    compile_missing_kernels()
 
 
 @pytest.hookimpl(optionalhook=True)

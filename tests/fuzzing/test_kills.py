@@ -20,7 +20,7 @@ from rodsight.run_folder import TRACKED
 from .attempt import attempt, attempt_in_fork, run_in_fork
 from .table import KILLS, note
 
-QUICK, SEED = 5, 4
+QUICK, SEED = 3, 4
 FEW = ("--set", "solver.sweeps=20", "--quiet")
 LONGEST = 1.5  # [s] of processor time until a kill at random
 

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import pytest
 
-# Tests with thousands of sweeps or time steps take minutes without compilation; tests without compiled code would be
+# Tests with hundreds of sweeps or time steps take minutes without compilation; tests without compiled code would be
 # repeated. The kernels are compared with plain twins in tests/reference, those of the posterior with integrals.
 COMPILED_ALONE = (
     "calibration", "convex", "dem", "sequence", "test_acceleration.py", "test_refinement.py", "test_frame_posterior.py",
     "test_radii.py", "test_simulated_forces.py", "test_changes.py", "test_kinematics.py",
+    "test_equilibrium_projection.py", "test_touching_gaps.py", "test_candidate_gaps.py", "test_sweep_record.py",
+    "test_start_residuals.py",
 )  # fmt: skip
 
 

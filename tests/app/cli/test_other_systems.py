@@ -60,8 +60,7 @@ print(len(VerdictLog(log.file).entries()))
     "what",
     [
         "track",
-        *(pytest.param(each, marks=pytest.mark.slow) for each in ("check", "verdict")),
-        pytest.param("solve", marks=pytest.mark.screen),
+        *(pytest.param(each, marks=pytest.mark.slow) for each in ("check", "verdict", "solve")),
     ],
 )  # solve compiles anew, without the number of cores
 def test_commands_need_nothing_that_only_unix_has(what, made_tracks, tmp_path):

@@ -101,7 +101,7 @@ def apparatus(tmp_path):
     return visitor, at, dict(zip(table.text("corner"), rows, strict=True))
 
 
-@pytest.mark.screen
+@pytest.mark.slow
 def test_discs_in_the_corners_are_found_with_the_bars_or_by_a_click(apparatus, tmp_path):
     visitor, at, true = apparatus
     described = visitor.request("find_walls", at=at)
