@@ -14,10 +14,12 @@ COMPILED_ALONE = (
     "test_equilibrium_projection.py", "test_touching_gaps.py", "test_candidate_gaps.py", "test_sweep_record.py",
     "test_start_residuals.py",
 )  # fmt: skip
+SMALL = ("test_equations.py", "test_normal_equations.py", "test_gap_error_draws.py", "test_contact_jacobian.py")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     here = Path(__file__).parent
     for item in items:
-        if item.path.is_relative_to(here) and not set(item.path.parts) & set(COMPILED_ALONE):
+        alone = set(item.path.parts) & set(COMPILED_ALONE) and item.path.name not in SMALL
+        if item.path.is_relative_to(here) and not alone:
             item.add_marker(pytest.mark.unit)
