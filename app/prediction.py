@@ -148,8 +148,12 @@ def measure_photographs(experiment: Experiment, rods: GrainGuess | None) -> Pict
 
 def describe_photographs(experiment: Experiment) -> list[str]:
     """Describe light, noise and pattern of the photographs in a few sentences. Raises InputError."""
-    measured = measure_photographs(experiment, read_grain_guess(experiment))
-    return [*measured.facts(), *measured.faults()]
+    from .tracking.missed_rods import describe_missed_rods
+
+    rods = read_grain_guess(experiment)
+    measured = measure_photographs(experiment, rods)
+    missed = [] if rods is None else describe_missed_rods(experiment, rods)
+    return [*measured.facts(), *measured.faults(), *missed]
 
 
 def _ordinal(number: int) -> str:

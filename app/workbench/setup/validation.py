@@ -34,6 +34,7 @@ from ...experiment.units import Scale
 from ...experiment.walls import read_walls
 from ...process.errors import InputError
 from ...solver.bodies.wall_shapes import bounding_distance
+from ...tracking.missed_rods import describe_missed_rods
 from ...tracks import Tracks, TrackStatus, WallTracks
 from .draft import Draft
 from .photograph_checks import LISTED, compare_with_camera, name_missing, unusable
@@ -274,6 +275,8 @@ def _validate_rods(found: ValidationResult, experiment: Experiment) -> None:
             f"About {expected} rods fill the area of those found, but {count} are found: mark the others, or try "
             "another channel, following by outline, or a range of radii."
         )
+    for sentence in describe_missed_rods(experiment, found.rods) if found.rods is not None else ():
+        found.steps["rods"].add_warning(sentence)
 
 
 def _warn_of_small(found: ValidationResult) -> None:

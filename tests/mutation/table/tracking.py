@@ -74,6 +74,14 @@ MUTANTS = [
         ("LEAST_SLOPE = 0.3", "LEAST_SLOPE = 3.0"),
     ),
     *mutants_of(
+        "app/tracking/missed_rods.py",
+        "tests/app/tracking/test_missed_rods.py",
+        (".mean() > UNDECIDED", ".mean() > 2.0"),
+        ("return places[alike(places, INSIDE)]", "return places"),
+        ("np.log1p(grey.std())", "0.0"),
+        ("if radius < FITS * smallest:", "if radius < 2.0 * FITS * smallest:"),
+    ),
+    *mutants_of(
         "app/tracking/outline/missing_discs.py",
         "tests/app/tracking/outline/test_missing_discs.py",
         ("if len(rows) >= FEWEST:", "if len(rows) >= 1000:"),

@@ -1,0 +1,174 @@
+"""Rods that were not found in a photograph: wide places between those found that look as these do.
+
+What a packing lacks among its rods is a hole, or a rod that detection missed. A rod that is missed looks like the
+others, a hole like the narrow pores between them. Where pores look like rods, as between photoelastic discs on a dark
+ground, the two cannot be distinguished.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..experiment.experiment import Experiment, GrainGuess
+from ..experiment.photographs import Photographs
+from ..experiment.pictures.image import Image, ImageSelection
+from ..solver.bodies.grains import Array
+
+SMALLEST = 0.05  # quantile of the radii below which nothing is looked for
+FITS = 0.85  # of the smallest radius: a place so wide may hold a rod that others hide in part
+DRAWN = 10.0  # [px] of the smallest radius in the picture in which distances are measured
+RIM_POINTS = 32  # of a disc, for the area that all enclose
+PORE = 0.12, 0.5  # of the smallest radius: widths of the pores that are compared …
+NARROWEST = 3.0  # [px] … and at least
+INSIDE, INSIDE_PORE = 0.8, 0.7  # of a radius: the part of a disc that is looked at
+MOST, MOST_PORES = 50, 400  # places and pores
+ALIKE = 4.0  # robust standard deviations of brightness and contrast within which a place looks like a rod
+LEAST_SD = np.array([3.0, 0.1])  # of brightness [grey] and of the logarithm of the contrast
+UNDECIDED = 0.5  # fraction of the pores that look like rods beyond which nothing is reported
+FEWEST = 5  # rods, and pores
+
+
+def describe_missed_rods(experiment: Experiment, rods: GrainGuess) -> list[str]:
+    """Return a sentence about the rods that a first photograph shows beside the given ones; none where it shows none.
+
+    Raises
+    ------
+    InputError
+        If the photograph cannot be read.
+    """
+    section = experiment.config.photographs
+    assert section is not None
+    file = experiment.photographs().files[0]
+    stat = file.stat()
+    given = np.array([rods.x, rods.y, rods.radius], np.float64).tobytes()
+    places = _missed_of_file(
+        file, stat.st_mtime_ns, stat.st_size, section.max_pixels, experiment.selection(file), given
+    )
+    if not places:
+        return []
+    (x, y), count = places[0], len(places)
+    least = "At least " if count == MOST else ""
+    subject = "1 place looks like a rod" if count == 1 else f"{least}{count} places look like rods"
+    return [
+        f"{subject} between the others and {'was' if count == 1 else 'were'} not found, the widest at column {x:.0f}, "
+        f"row {y:.0f}: mark what is missing, give the known radii, or try another channel."
+    ]
+
+
+@lru_cache(maxsize=4)
+def _missed_of_file(
+    file: Path, _changed: int, _size: int, max_pixels: int, selection: ImageSelection, given: bytes
+) -> list[tuple[float, float]]:
+    """Columns and rows of the missed rods; a photograph is read once as long as it and the rods are the same."""
+    image = Photographs([file], max_pixels=max_pixels, selection=selection)[0]
+    return [(x, y) for x, y, _ in find_missed_rods(image, *np.frombuffer(given).reshape(3, -1)).tolist()]
+
+
+def find_missed_rods(image: Image, x: Array, y: Array, radius: Array) -> Array:
+    """Find places that look like rods that were not found.
+
+    Parameters
+    ----------
+    image : (H, W)
+        The photograph [grey].
+    x, y, radius : (n,)
+        The rods that were found [px].
+
+    Returns
+    -------
+    (m, 3)
+        x, y and radius of the widest disc [px] at every such place, the widest first; none where pores look like rods,
+        and at most 50.
+
+    Notes
+    -----
+    Places lie in the convex hull of the rods. A place looks like a rod where the mean grey level within .8 of its
+    radius and the logarithm of its standard deviation are both within four robust standard deviations of those of the
+    rods.
+    """
+    if len(radius) < FEWEST:
+        return np.empty((0, 3))
+    rods = np.column_stack([x, y, radius])
+    smallest = float(np.quantile(radius, SMALLEST))
+    free, scale, corner = _free_area(rods, smallest)
+    pores = _find_pores(free, scale, corner, smallest)
+    places = _find_places(free, scale, corner, smallest, float(radius.max()))
+    if len(places) == 0 or len(pores) < FEWEST:
+        return np.empty((0, 3))
+    look = _appearance(image, rods, INSIDE)
+    look = look[np.isfinite(look).all(axis=1)]
+    if len(look) < FEWEST:
+        return np.empty((0, 3))
+    middle = np.median(look, axis=0)
+    spread = 1.4826 * np.median(np.abs(look - middle), axis=0) + LEAST_SD
+
+    def alike(discs: Array, part: float) -> NDArray[np.bool_]:
+        away = np.abs(_appearance(image, discs, part) - middle) / spread
+        return np.nan_to_num(away, nan=np.inf).max(axis=1) < ALIKE
+
+    if alike(pores, INSIDE_PORE).mean() > UNDECIDED:
+        return np.empty((0, 3))
+    return places[alike(places, INSIDE)]
+
+
+def _free_area(rods: Array, smallest: float) -> tuple[NDArray[np.uint8], float, Array]:
+    """Draw the area between the rods (h, w), not zero where it is free; pixels per pixel, and the corner [px]."""
+    angle = np.linspace(0.0, 2.0 * np.pi, RIM_POINTS, endpoint=False)
+    rims = rods[:, None, :2] + rods[:, 2, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    scale = min(DRAWN / smallest, 1.0)
+    # A margin: the transform measures distances to pixels that are not free, not to the border of the picture.
+    corner, far = rims.min(axis=(0, 1)) - 3.0 / scale, rims.max(axis=(0, 1)) + 3.0 / scale
+    width, height = np.ceil((far - corner) * scale).astype(int) + 1
+    free = np.zeros((height, width), np.uint8)
+    hull = cv2.convexHull(((rims.reshape(-1, 2) - corner) * scale).astype(np.float32))
+    cv2.fillConvexPoly(free, np.rint(hull).astype(np.int32), 255)
+    for px, py, r in np.column_stack([(rods[:, :2] - corner) * scale, rods[:, 2] * scale]):
+        cv2.circle(free, (round(px), round(py)), round(r), 0, cv2.FILLED)
+    return free, scale, corner
+
+
+def _find_places(free: NDArray[np.uint8], scale: float, corner: Array, smallest: float, largest: float) -> Array:
+    """Places (m, 3) where a rod fits [px], one after the other, the widest first."""
+    left, found = free.copy(), []
+    while len(found) < MOST:
+        distance = cv2.distanceTransform(left, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        row, column = np.unravel_index(int(distance.argmax()), distance.shape)
+        radius = float(distance[row, column]) / scale
+        if radius < FITS * smallest:
+            break
+        radius = min(radius, largest)
+        found.append((column / scale + corner[0], row / scale + corner[1], radius))
+        cv2.circle(left, (int(column), int(row)), max(round(radius * scale), 1), 0, cv2.FILLED)
+    return np.array(found).reshape(-1, 3)
+
+
+def _find_pores(free: NDArray[np.uint8], scale: float, corner: Array, smallest: float) -> Array:
+    """Widest discs (m, 3) in the narrow pores [px]."""
+    distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    radius = distance / scale
+    low, high = PORE[0] * smallest, PORE[1] * smallest
+    highest = (distance == cv2.dilate(distance, np.ones((3, 3), np.uint8))) & (radius < high)
+    row, column = np.nonzero(highest & (radius >= max(low, NARROWEST)))
+    chosen = np.unique(np.linspace(0, len(row) - 1, MOST_PORES).round().astype(int)) if len(row) else row
+    row, column = row[chosen], column[chosen]
+    return np.column_stack([column / scale + corner[0], row / scale + corner[1], radius[row, column]])
+
+
+def _appearance(image: Image, discs: Array, part: float) -> Array:
+    """Mean grey level and logarithm of the contrast (n, 2) within a part of discs (n, 3); NaN beyond the photograph."""
+    found = np.full((len(discs), 2), np.nan)
+    for k, (x, y, radius) in enumerate(discs):
+        reach = max(part * radius, 1.5)
+        top, left = int(np.ceil(y - reach)), int(np.ceil(x - reach))
+        bottom, right = int(np.floor(y + reach)) + 1, int(np.floor(x + reach)) + 1
+        if top < 0 or left < 0 or bottom > image.shape[0] or right > image.shape[1]:
+            continue
+        rows, columns = np.ogrid[top:bottom, left:right]
+        grey = image[top:bottom, left:right][(rows - y) ** 2 + (columns - x) ** 2 <= reach**2]
+        found[k] = grey.mean(), np.log1p(grey.std())
+    return found
