@@ -156,7 +156,8 @@ def _find_pores(free: NDArray[np.uint8], scale: float, corner: Array, smallest: 
     row, column = np.nonzero(highest & (radius >= max(low, NARROWEST)))
     chosen = np.unique(np.linspace(0, len(row) - 1, MOST_PORES).round().astype(int)) if len(row) else row
     row, column = row[chosen], column[chosen]
-    return np.column_stack([column / scale + corner[0], row / scale + corner[1], radius[row, column]])
+    place = np.column_stack([column, row]) / scale + corner
+    return np.column_stack([place, radius[row, column].astype(np.float64)])
 
 
 def _appearance(image: Image, discs: Array, part: float) -> Array:

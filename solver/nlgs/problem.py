@@ -207,7 +207,7 @@ def _free_motion(
 
 
 def _effective_impedances(
-    body: Array, plate: Array, wall_body: NDArray[np.int64], along_normal: Array, along_tangent: Array
+    body: Array, plate: Array, wall_body: NDArray[np.integer], along_normal: Array, along_tangent: Array
 ) -> tuple[Array, Array]:
     """Normal and tangential force over a change of relative velocity (c,) [N s/m], of contacts with walls."""
     grain_w, plate_w = body[wall_body[:, 0], 3], plate[wall_body[:, 1], 1]
