@@ -8,7 +8,7 @@ than the given input, and than all other causes, is named. Nothing is named that
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -33,7 +33,7 @@ from .direct_tests import (
     examine_walls,
     find_impossible_poses,
 )
-from .distortion import undistorted
+from .distortion import seeks_distortion, undistorted
 from .resistance import examine_resistance
 from .rivals import rivals_of
 from .trial import TRIAL_PHOTOGRAPHS, Trial, select_window, solve_trial, trial_score
@@ -95,7 +95,10 @@ def diagnose(
     if not found and sliding and inputs.tracks.grain_count >= LEAST_GRAINS:
         found = _examine_sliding(inputs, first)
     if not (found or trial is None or inputs.tracks.grain_count < LEAST_GRAINS):
-        found = _compare_rivals(inputs, trial, progress, first)
+        # Gaps between hard rods show a stretching by themselves. Where they show none, one that wins moves the walls.
+        sought = undisturbed or seeks_distortion(inputs, walls)
+        excluded = ("stretched_picture",) if sought and not (camera or trial.soft) else ()
+        found = _compare_rivals(inputs, trial, progress, first, excluded)
     if poses and float(impossible.mean()) > FEW_OUTLIERS:  # so many explain it
         found = [each for each in found if each.cause != "not_explained"]
     if found:  # wrong radii look like a few jumps
@@ -103,8 +106,10 @@ def diagnose(
     return [*found, *camera, *poses]
 
 
-def _compare_rivals(inputs: Inputs, trial: Trial, progress: Progress, first: int) -> list[Finding]:
-    """Solve the rivals of the geometry, and name the one that clearly wins."""
+def _compare_rivals(
+    inputs: Inputs, trial: Trial, progress: Progress, first: int, excluded: Collection[str]
+) -> list[Finding]:
+    """Solve the rivals of the geometry, and name the one that clearly wins unless its cause is excluded."""
     rivals = list(rivals_of(inputs))
     rise: dict[str, tuple[float, str]] = {}
     for done, rival in enumerate(rivals):
@@ -113,7 +118,7 @@ def _compare_rivals(inputs: Inputs, trial: Trial, progress: Progress, first: int
         rise[rival.cause] = max(rise.get(rival.cause, (float("-inf"), "")), (score - trial.score, rival.words))
     progress("diagnosing", len(rivals), len(rivals))
     best = _winner(rise)
-    if best:
+    if best and best not in excluded:
         gain, words = rise[best]
         return [finding(best, f"if {words}, what the forces leave unexplained falls to {_remainder(gain)}")]
     return [finding("not_explained", trial.worst)] if trial.expected[0] < UNEXPLAINED and trial.worst else []

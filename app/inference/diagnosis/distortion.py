@@ -24,12 +24,18 @@ def undistorted(
     if settings.calibration is not None:
         tracks, exchanged = correct_exchanged_sizes(tracks)
     named = [finding("exchanged_sizes", exchanged)] if exchanged else []
-    if not camera or settings.boundary is None or not settings.boundary.camera or not walls.count:
+    if not (camera and seeks_distortion(inputs, walls)):
         return tracks, walls, named
     tracks, walls, _, found = correct_camera(
         inputs.material, tracks, walls, failed, radii_known=settings.radii_are_known
     )
     return tracks, walls, named if found is None else [*named, _name(found)]
+
+
+def seeks_distortion(inputs: Inputs, walls: WallTracks) -> bool:
+    """Whether a run looks for a distortion of the camera in the gaps between rods."""
+    boundary = inputs.settings.boundary
+    return boundary is not None and bool(boundary.camera) and walls.count > 0
 
 
 def _name(found: CameraDistortion) -> Finding:

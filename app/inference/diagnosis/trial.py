@@ -54,6 +54,11 @@ class Trial:
         return float(np.mean(found)) if found else -math.inf
 
     @property
+    def soft(self) -> bool:
+        """Whether the gaps are overlaps that forces make."""
+        return any(each.information.soft for each in self.evidence)
+
+    @property
     def worst(self) -> str:
         """The weightiest reason against the forces, in words; empty: none."""
         found = [each for evidence in self.evidence for each in find_penalties(evidence)[:1]]
