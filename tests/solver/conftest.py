@@ -14,7 +14,13 @@ COMPILED_ALONE = (
     "test_equilibrium_projection.py", "test_touching_gaps.py", "test_candidate_gaps.py", "test_sweep_record.py",
     "test_start_residuals.py",
 )  # fmt: skip
-SMALL = ("test_equations.py", "test_normal_equations.py", "test_gap_error_draws.py", "test_contact_jacobian.py")
+SMALL = (
+    "test_equations.py",
+    "test_normal_equations.py",
+    "test_gap_error_draws.py",
+    "test_contact_jacobian.py",
+    "test_gaps.py",
+)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

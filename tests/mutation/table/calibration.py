@@ -21,7 +21,7 @@ MUTANTS = [
     ),
     *mutants_of(
         "solver/calibration/gaps.py",
-        (*CALIBRATE, SCALE),
+        ("tests/solver/calibration/test_gaps.py", *CALIBRATE, SCALE),
         ("gap[c] = distance - radius[i] - radius[j]", "gap[c] = distance - radius[i]"),
         ("endpoints[kw, w].mean(axis=1)", "endpoints[kw, w, 0]"),
     ),

@@ -157,7 +157,7 @@ MUTANTS = [
     ),
     *mutants_of(
         "solver/convex/friction_check.py",
-        SLIDING,
+        "tests/solver/convex/test_friction_check.py",
         ("(snapshots[k - 1], snapshots[k + 1])", "(snapshots[k - 1], snapshots[k])"),
     ),
     *mutants_of(

@@ -13,7 +13,7 @@ MUTANTS = [
     ),
     *mutants_of(
         "solver/convex/dual_prices.py",
-        ("tests/solver/convex/test_dual_prices.py",),
+        ("tests/solver/convex/test_dual_prices.py", "tests/solver/sequence/test_missing_contacts.py"),
         ("velocity[pairs.i] - velocity[pairs.j]", "velocity[pairs.j] - velocity[pairs.i]"),
         ("velocity[n + plates] = ", "velocity[n + plates] = 0.0 * "),
         ("if not price[row] > least:", "if True:"),

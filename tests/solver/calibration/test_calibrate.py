@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rodsight.solver.calibration import calibrate as module
 from rodsight.solver.calibration.calibrate import calibrate
 from rodsight.solver.calibration.equations import GapEquations, move_walls, rotate_offsets
 from rodsight.solver.calibration.gaps import MeasuredSequence, find_gap_rows
-from rodsight.solver.calibration.priors import CalibrationPriors
+from rodsight.solver.calibration.priors import CalibrationPriors, narrow_priors, reduce_priors
 from rodsight.solver.calibration.weights import contact_width
 
 RADIUS = 8e-3  # [m]
@@ -294,13 +295,40 @@ def test_wrong_tracks_do_not_affect_the_others(true, rng):
     assert result.after.impossible > 0.0
 
 
-def test_understated_noise_is_reported(true, rng):
+def test_understated_noise_is_reported(true, rng, monkeypatch):
     offset = rng.normal(0, 50e-6, (true.grain_count, 2))
     measured = add_noise(falsify(true, offset=offset), 10e-6, rng)
     understated = replace(measured, sigma=measured.sigma / 4)
+    used, once = [], module._calibrate
+
+    def record(sequence, *rest):
+        used.append(float(sequence.sigma.mean()))
+        return once(sequence, *rest)
+
+    monkeypatch.setattr(module, "_calibrate", record)
     result = calibrate(understated, PRIORS, rng=rng)
     assert 2.0 < result.noise_factor < 5.0
+    assert used[1] / used[0] == pytest.approx(result.noise_factor, rel=0.3)  # repeated with the measured noise
     assert "times the stated noise" in result.verdict
     stated = calibrate(measured, PRIORS, rng=rng)
     assert stated.noise_factor < 1.2
     assert "times the stated noise" not in stated.verdict
+
+
+def test_priors_are_narrowed_to_the_width_of_the_overlaps(true, rng):
+    measured = falsify(true, offset=rng.normal(0, 20e-6, (true.grain_count, 2)))
+    wide = replace(PRIORS, centre=200e-6, radius=0.0)
+    narrow, ratio = narrow_priors(GapEquations(measured), wide, 0.0)
+    assert ratio < 0.5
+    assert narrow.centre == pytest.approx(ratio * wide.centre)
+    assert narrow_priors(GapEquations(measured), replace(wide, centre=1e-6), 0.0)[0].centre == 1e-6  # a limit
+
+
+def test_reduced_priors_count_the_estimate_and_its_error(true):
+    equations = GapEquations(true)
+    unknowns, draws = np.zeros(equations.layout.count), np.zeros((4, equations.layout.count))
+    unknowns[equations.layout.offset], draws[:, equations.layout.offset] = 3e-6, 4e-6
+    draws[:, equations.layout.radius] = 1.0
+    found = reduce_priors(replace(PRIORS, centre=1e-3, radius=7e-6), equations, unknowns, draws)
+    assert found.centre == pytest.approx(5e-6)
+    assert found.radius == 7e-6  # the limit

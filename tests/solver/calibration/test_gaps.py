@@ -1,7 +1,7 @@
 import tracemalloc
 
 import numpy as np
-from rodsight.solver.calibration.gaps import MeasuredSequence, find_gap_rows
+from rodsight.solver.calibration.gaps import GapRows, MeasuredSequence, find_gap_rows, measure_gaps
 
 SIDE, PITCH, R = 40, 0.02, 0.009
 MEMORY = 5e6  # [B]; all pairs of these grains would take fifty
@@ -35,3 +35,13 @@ def test_pairs_within_reach_are_those_of_neighbours():
     rows = find_gap_rows(sequence, 1.1 * apart, wall_reach=-np.inf)
     assert rows.count == 2 * SIDE * (SIDE - 1)
     assert np.all(rows.i < rows.j)
+
+
+def test_the_gap_of_two_grains_is_their_distance_less_both_radii():
+    sequence = square_of_grains()
+    radius = np.linspace(0.5 * R, R, sequence.grain_count)
+    pair = GapRows(*(np.array([value], np.int32) for value in (0, 2, SIDE + 3, 0)))  # frame, i, j, pair
+    found = measure_gaps(pair, sequence.position, sequence.endpoints, radius)
+    distance = PITCH * np.sqrt(2.0)
+    np.testing.assert_allclose(found.gap, distance - radius[2] - radius[SIDE + 3], rtol=1e-9)
+    np.testing.assert_allclose(found.normal, [[np.sqrt(0.5), np.sqrt(0.5)]], rtol=1e-9)

@@ -54,8 +54,21 @@ def test_errors_from_later_frames_correct_the_first(centre: float, radius: float
     stated = errors.gap_sd(sequence, first)
     assert errors.overlap == pytest.approx(OVERLAP, rel=0.2)
     assert np.sqrt(np.mean(residual**2)) < 1.3 * np.sqrt(2.0) * SIGMA  # of errors ten times as large
-    assert np.median(stated) < 0.6 * np.sqrt(2.0) * SIGMA
+    unknowns = SIDE**2 * ((2 if centre else 0) + (1 if radius else 0))
+    known = np.sqrt(min(unknowns / first.count, 1.0) / (FRAMES - 1))  # of the noise, by as many frames
+    assert np.median(stated) == pytest.approx(known * np.sqrt(2.0) * SIGMA, rel=0.25)
     assert np.sqrt(np.mean(residual**2 / (2.0 * SIGMA**2 + stated**2))) == pytest.approx(1.0, abs=0.15)
+
+
+def test_overlap_is_per_unit_of_force():
+    sequence, position = make_lattice(np.random.default_rng(0), centre=5e-5)
+    rows = find_gap_rows(sequence, 1e-3)
+    force = -measure_gaps(rows, position, sequence.endpoints, np.full(SIDE * SIDE, R)).gap / OVERLAP
+    one, kilo = (
+        find_grain_errors(sequence, rows, scale * force, centre=5e-5, radius=0.0, rng=np.random.default_rng(1))
+        for scale in (1.0, 1e3)
+    )
+    assert kilo.overlap == pytest.approx(1e-3 * one.overlap)
 
 
 def test_exact_quantities_are_not_corrected():

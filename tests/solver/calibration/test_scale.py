@@ -77,6 +77,8 @@ def test_elastic_overlap_is_not_a_scale_error(rng):
     overlap = 5e-6
     softened = replace(true, radius=true.radius + 0.5 * overlap)
     assert not find_scale(softened, PRIORS, overlap, classes).found
+    hard, soft = (scale._find_peaks(softened, classes, each) for each in (0.0, overlap))
+    np.testing.assert_allclose(soft.excess - hard.excess, overlap)
 
 
 @pytest.mark.parametrize("error", [-80e-6, 80e-6])
