@@ -37,6 +37,8 @@ MEASURES: dict[str, Callable[[Evidence], float]] = {
     # two readings of the positions: the posterior, and the balance of overlaps
     "disagreement_of_positions": lambda e: 1.0 - e.position_agreement,
 }
+# Where nothing slides, these are small for want of motion, which is no evidence for the forces.
+BY_SLIDING = frozenset({"disagreement_of_members", "force_change", "power_gap"})
 MOSTLY_OVERLAPS = 0.5  # weight of the position-only estimate of soft grains above which only its evidence counts
 CONTRADICTED: float = FITTED["expected_correlation"]["contradicted"]  # change of a prediction where a cause is named
 WIDEST: float = FITTED["expected_correlation"]["widest_gap_error"]  # gap error that simulated frames have reached
@@ -62,7 +64,8 @@ def expect_correlation(evidence: Evidence) -> float:
     -----
     r = tanh(max(b + Σ h_j(ln x_j), least)) with non-increasing, piecewise linear h_j of the measures x_j, fitted on
     simulated packings (fitted.toml). A measure that is not known adds nothing; `least` belongs to the worst evidence
-    that was fitted, beyond which nothing is known.
+    that was fitted, beyond which nothing is known. What speaks for the forces by BY_SLIDING counts in proportion to the
+    sliding over its noise, up to one.
     """
     return max(math.tanh(correlation_score(evidence)), 0.0)
 
@@ -106,7 +109,8 @@ def predict_correlation(evidence: Sequence[Evidence], *, contradicted: bool = Fa
     for name, each in _terms(table):
         known = [_logarithm(each, x) for x in map(MEASURES[name], evidence) if not math.isnan(x)]
         if known:
-            score += float(np.interp(np.mean(known), np.log(each["at"]), each["value"]))
+            value = float(np.interp(np.mean(known), np.log(each["at"]), each["value"]))
+            score += _as_far_as_seen(name, value, float(np.mean([_seen_sliding(e) for e in evidence])))
     score += CONTRADICTED if contradicted else 0.0
     score, sd = max(score, float(table["least"])), float(table["sd"])
     r, low, high = (max(math.tanh(each), 0.0) for each in (score, score - sd, score + sd))
@@ -121,8 +125,9 @@ def rests_on_overlaps(evidence: Evidence) -> bool:
 def losses(evidence: Evidence) -> dict[str, float]:
     """By how much the bound would rise if one measure were as in the best eighth of the fit, for each known measure."""
     table, score, known = _table(evidence), correlation_score(evidence), _known_fraction(evidence)
+    seen = _seen_sliding(evidence)
     best = {
-        name: max(float(each["value"][BEST_EIGHTH]) - _term(each, MEASURES[name](evidence)), 0.0)
+        name: max(_as_far_as_seen(name, float(each["value"][BEST_EIGHTH]), seen) - _term(name, each, evidence), 0.0)
         for name, each in _terms(table)
     }
     bound = known * _bound(score, evidence)
@@ -148,14 +153,27 @@ def _bound(score: float, evidence: Evidence) -> float:
 def correlation_score(evidence: Evidence) -> float:
     """Argument g of the expected correlation tanh(g), which may be negative."""
     table = _table(evidence)
-    score = float(table["constant"]) + sum(_term(each, MEASURES[name](evidence)) for name, each in _terms(table))
+    score = float(table["constant"]) + sum(_term(name, each, evidence) for name, each in _terms(table))
     return max(score, float(table["least"]))
 
 
-def _term(table: dict[str, Any], measure: float) -> float:
+def _term(name: str, table: dict[str, Any], evidence: Evidence) -> float:
+    measure = MEASURES[name](evidence)
     if math.isnan(measure):
         return 0.0
-    return float(np.interp(_logarithm(table, measure), np.log(table["at"]), table["value"]))
+    value = float(np.interp(_logarithm(table, measure), np.log(table["at"]), table["value"]))
+    return _as_far_as_seen(name, value, _seen_sliding(evidence))
+
+
+def _as_far_as_seen(name: str, value: float, seen: float) -> float:
+    """What a measure adds, where a fraction of the sliding is seen."""
+    return seen * value if name in BY_SLIDING and value > 0.0 else value
+
+
+def _seen_sliding(evidence: Evidence) -> float:
+    """Sliding over its noise, at most 1; 1 where that is not known."""
+    signal = evidence.information.slide_signal
+    return 1.0 if math.isnan(signal) else min(signal, 1.0)
 
 
 def _logarithm(table: dict[str, Any], measure: float) -> float:

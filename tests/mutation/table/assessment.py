@@ -52,6 +52,7 @@ MUTANTS = [
         "solver/assessment/expected_correlation.py",
         (EXPECTED, PENALTIES),
         ("lambda e: 1.0 - e.agreement", "lambda e: e.agreement"),
+        ("return seen * value if name in BY_SLIDING and value > 0.0 else value", "return value"),
         ("1.0 - float(np.fmax(e.agreement, e.overlap_agreement))", "1.0 - e.agreement"),
         ('float(bound["constant"]) + float(bound["score"]) * score', 'float(bound["constant"])'),
         ("math.tanh(score - max(margin, 0.0))", "math.tanh(score + max(margin, 0.0))"),
@@ -61,7 +62,7 @@ MUTANTS = [
         ('np.log(table["at"])', 'np.asarray(table["at"])'),
         ('"motion" if math.isnan(evidence.agreement) else "both"', '"both"'),
         ("    if math.isnan(measure):\n        return 0.0\n", ""),
-        ('float(each["value"][BEST_EIGHTH]) - _term', 'float(each["value"][-1]) - _term'),
+        ('float(each["value"][BEST_EIGHTH]), seen) - _term', 'float(each["value"][-1]), seen) - _term'),
     ),
     *mutants_of(
         "solver/assessment/mixture_trust.py",

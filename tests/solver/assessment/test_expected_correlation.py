@@ -120,3 +120,23 @@ def test_the_bound_falls_with_gaps_wider_than_any_that_was_fitted():
     wide = with_gaps(2.0 * WIDEST)
     overlaps = replace(wide.information, unexplained_gap=0.5 * WIDEST * wide.information.diameter)
     assert bound_correlation(replace(wide, information=overlaps)) == pytest.approx(bound_correlation(widest))
+
+
+def test_agreement_without_sliding_is_no_evidence():
+    def score(signal: float, **changes: float) -> float:
+        return correlation_score(replace(BOTH, information=replace(BOTH.information, slide_signal=signal), **changes))
+
+    calm, usual = {"disagreement": 0.05, "force_change": 0.01, "power_gap": 0.01}, {
+        "disagreement": 0.2, "force_change": 0.035, "power_gap": 0.08
+    }  # fmt: skip
+    rise = {signal: score(signal, **calm) - score(signal, **usual) for signal in (0.0, 0.5, 1.0, 9.0)}
+    assert rise[0.0] == pytest.approx(0.055, abs=0.04)  # the difference of the negative parts alone
+    assert rise[0.0] < 0.1 < 0.3 < rise[0.5] < rise[1.0]
+    assert rise[9.0] == pytest.approx(rise[1.0])
+    worse = {"disagreement": 0.5, "force_change": 0.3, "power_gap": 0.5}
+    against = {signal: score(signal, **usual) - score(signal, **worse) for signal in (0.0, 9.0)}
+    assert against[0.0] == pytest.approx(against[9.0], abs=0.1)  # evidence against the forces counts as before
+    assert (
+        predict_correlation([replace(BOTH, information=replace(BOTH.information, slide_signal=0.0), **calm)])[0]
+        < predict_correlation([replace(BOTH, information=replace(BOTH.information, slide_signal=0.1), **calm)])[0]
+    )
