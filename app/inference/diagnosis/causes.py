@@ -86,6 +86,10 @@ CAUSES: dict[str, Cause] = {
         "these rods penetrate their neighbours or touch none",
         "a run uses the sizes with which they touch: correct their radii in the table",
     ),
+    "sections_not_round": Cause(
+        "rods that touch seem apart in some directions and overlap in others",
+        "take forces for patterns, not for values, unless the trust is high: rods are circles in this model",
+    ),
     "not_explained": Cause(
         "the forces contradict the motion, the positions or one another",
         "check radii, walls, pixel size and tracks; the packing may do what this model lacks, such as cohesion, "

@@ -36,6 +36,7 @@ from .direct_tests import (
 from .distortion import seeks_distortion, undistorted
 from .resistance import examine_resistance
 from .rivals import rivals_of
+from .sections import examine_sections
 from .trial import TRIAL_PHOTOGRAPHS, Trial, select_window, solve_trial, trial_score
 
 # Rise of arctanh r that a rival must reach over the given input, and over all other causes. On correct input, and where
@@ -88,7 +89,7 @@ def diagnose(
     tracks, walls, camera = undistorted(inputs, walls, failed, camera=not undisturbed)
     found = [*examine_rotations(tracks, walls), *examine_order(tracks)]
     found += examine_walls(tracks, walls) or examine_wall_times(tracks, walls) or examine_wall_places(tracks, walls)
-    found += examine_sizes(tracks, walls)
+    found += examine_sizes(tracks, walls) or examine_sections(tracks)
     found += examine_inertia(tracks, walls, inputs.material)
     impossible = np.zeros(tracks.status.shape, np.bool_) if undisturbed else find_impossible_poses(tracks, walls)
     poses = examine_poses(tracks, impossible)

@@ -42,6 +42,7 @@ TRUE_CAUSE: dict[ScenarioName, tuple[str, ...]] = {
     "base_friction": ("base_friction",), "smooth_walls": ("wall_friction",), "rough_walls": ("wall_friction",),
     "smooth_walls_spread": ("wall_friction",), "cohesion": ("adhesion",), "strong_cohesion": ("adhesion",),
     "rolling": ("rolling_resistance",),
+    "elliptic": ("sections_not_round",), "slightly_elliptic": ("sections_not_round",),
     "inertia": ("inertia",), "strong_inertia": ("inertia",), "nearly_jammed": ("base_friction",),
 }  # fmt: skip
 # Of several scenarios with the same input error but for its size, one.

@@ -15,6 +15,11 @@ MUTANTS = [
         ("radius=found.shared_radius(tracks.radius)", "radius=-found.shared_radius(tracks.radius)"),
     ),
     *mutants_of(
+        "solver/boundary/section_shape.py",
+        f"{TESTS}/diagnosis/test_sections.py",
+        ("np.cos(2.0 * between)", "np.cos(3.0 * between)"),
+    ),
+    *mutants_of(
         "app/inference/backward_pass.py",
         f"{TESTS}/test_backward_pass.py",
         ("information * variance[:, :1] + second[:, :1]", "variance[:, :1] + second[:, :1]"),
