@@ -118,7 +118,7 @@ def kill_and_resume(experiment: Path, out: Path, count: int, rng: random.Random)
     return killed, problems
 
 
-@pytest.mark.screen
+@pytest.mark.slow  # tests/app/cli/test_run.py kills one run
 def test_a_few_kills_lose_nothing(originals, tmp_path):
     killed, problems = kill_and_resume(originals.tracked, tmp_path / "out", QUICK, random.Random(SEED))
     assert problems == []

@@ -47,7 +47,7 @@ def test_wrong_options_of_films_are_named(examples, options, message, capsys):
 
 
 @pytest.mark.screen
-@pytest.mark.parametrize("suffix", ["mp4", "webm"])
+@pytest.mark.parametrize("suffix", [pytest.param("mp4", marks=pytest.mark.slow), "webm"])
 def test_a_browser_plays_the_film(examples, tmp_path, page, suffix):
     film = tmp_path / f"film.{suffix}"
     run = str(examples / "runs/shear")

@@ -89,6 +89,22 @@ def test_old_results_can_be_looked_at(out, made_tracks, monkeypatch, capsys):
     assert "made by other code: they are shown as they are" in " ".join(capsys.readouterr().out.split())
 
 
+def test_a_program_is_described_only_where_it_made_other_results_of_the_same_input(made_tracks, tmp_path):
+    origin = run_folder.Run(load_experiment(made_tracks), tmp_path).origin(FORCES)
+    same = {"made_from": "other", "inputs": origin.inputs, "code": "other", "libraries": origin.libraries}
+    assert run_folder.describe_program(same, origin) == "other code"
+    assert run_folder.describe_program(same | {"made_from": origin.fingerprint}, origin) == ""
+    assert run_folder.describe_program(same | {"inputs": "other"}, origin) == ""
+
+
+def test_settings_are_part_of_the_input(made_tracks, tmp_path):
+    inputs = {
+        run_folder.Run(load_experiment(made_tracks, settings), tmp_path).origin(FORCES).inputs
+        for settings in ((), ("material.friction=0.3",), ("solver.sweeps=7",))
+    }
+    assert len(inputs) == 3
+
+
 def test_frames_of_two_programs_do_not_mix(made_tracks, tmp_path, monkeypatch):
     run = run_folder.Run(load_experiment(made_tracks), tmp_path / "out")
     first = run.checkpoint("solving", run.origin(FORCES).fingerprint)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from rodsight import run_folder
 from rodsight.experiment.experiment import load_experiment
 from rodsight.process.errors import InputError
-from rodsight.run_folder import Run, hold_run, owner_of
+from rodsight.run_folder import Run, has_input, hold_run, owner_of
 from rodsight.workbench.service.project import Project
 from rodsight.workbench.service.workbench import Workbench
 
@@ -79,3 +83,26 @@ def test_the_results_of_another_experiment_are_not_reviewed(tracked, claimed, ca
     (claimed / "results.h5").touch()
     assert rodsight("review", copy, "--no-browser") == 2
     assert "holds the run of another experiment" in capsys.readouterr().err
+
+
+def test_an_experiment_file_that_is_unchanged_is_that_of_the_run_whatever_else_changed(tracked):
+    file = tracked / "experiment.toml"
+    others = dict.fromkeys(("tracks.csv", "grains.csv"), "other")
+    assert has_input(file, {file.name: hashlib.sha256(file.read_bytes()).hexdigest(), **others})
+    assert not has_input(file, {file.name: "other", **others})
+
+
+def test_a_folder_that_another_experiment_claims_meanwhile_is_refused(tracked, tmp_path, monkeypatch):
+    other, out = Path(shutil.copytree(tracked, tmp_path / "other")), tmp_path / "out"
+    hold = run_folder.hold_folder
+
+    @contextmanager
+    def claimed_first(folder: Path, *rest: object) -> Iterator[None]:
+        Run(load_experiment(other), folder).claim()
+        with hold(folder, *rest):
+            yield
+
+    out.mkdir()
+    monkeypatch.setattr(run_folder, "hold_folder", claimed_first)
+    with pytest.raises(InputError, match="of another experiment"), hold_run(Run(load_experiment(tracked), out)):
+        pass

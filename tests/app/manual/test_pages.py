@@ -158,7 +158,9 @@ def python_blocks() -> Iterator[Any]:
     """Yield each page with the number and the text of a Python block."""
     for page, text in TEXTS.items():
         for number, block in enumerate(blocks(text, "python")):
-            yield pytest.param(page, number, block, id=f"{page}-{number}")
+            campaign = "rodsight.campaign(" in block  # which tests/app/campaigns runs
+            marks = pytest.mark.slow if campaign else ()
+            yield pytest.param(page, number, block, id=f"{page}-{number}", marks=marks)
 
 
 @pytest.mark.thorough

@@ -34,7 +34,7 @@ def test_the_fitted_weight_is_the_best_one_on_frames_that_were_not_fitted() -> N
     assert (other.r.max(axis=1) - other.reached(np.full(COUNT, best.mean()))).mean() > 0.01
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_mixtures_are_those_of_a_run(tmp_path) -> None:
     made = make_scenario(tmp_path, "smooth_walls", 3, grains=60)
     alone = solve_scenario(load_experiment(made.folder, ALONE), no_progress)

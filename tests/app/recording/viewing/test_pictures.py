@@ -15,7 +15,7 @@ needs_vulkan = pytest.mark.skipif(not vulkan_drivers(), reason="no Vulkan driver
 
 
 @needs_vulkan
-@pytest.mark.screen
+@pytest.mark.slow  # test_viewer.py draws one
 def test_pictures_of_tabs_and_views_at_any_time(recording):
     with HeadlessViewer(recording.path, width=900, height=600) as viewer:
         assert viewer.tabs[0] == "Summary"
