@@ -19,6 +19,7 @@ SMALL = (
     "test_normal_equations.py",
     "test_gap_error_draws.py",
     "test_contact_jacobian.py",
+    "test_elliptic_section.py",
     "test_gaps.py",
 )
 
