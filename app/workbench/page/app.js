@@ -182,15 +182,28 @@ function markOf(step) {
 
 const CONTROLS = "button, input, select, summary, a[href]";
 
+let typing = null; // the field whose text is not yet given to the server
+addEventListener("input", (event) => { typing = event.target; });
+addEventListener("change", () => { typing = null; });
+
 /** The control that has the focus keeps it when its part of the page is made anew: by its name, else by its place. */
 function rememberFocus() {
   const had = document.activeElement, part = had?.closest?.("#panel, #steps");
   if (!part) return () => {};
   const { id } = had, place = [...part.querySelectorAll(CONTROLS)].indexOf(had);
+  const text = typing === had && had.type === "text" ? had.value : null, selected = had.type === "text" ? [had.selectionStart, had.selectionEnd] : null;
+  typing = null; // a field that is taken away is not left by a person
   return () => {
     if (part.contains(document.activeElement)) return;
     const again = (id && at(id)) || part.querySelectorAll(CONTROLS)[place];
-    if (again && part.contains(again)) again.focus({ preventScroll: true });
+    if (!again || !part.contains(again)) return;
+    again.focus({ preventScroll: true });
+    if (!selected || again.type !== "text") return;
+    if (text !== null) { // what a person is typing stays, and is given to the server as if the field had not been made anew
+      again.value = text; typing = again;
+      again.addEventListener("blur", () => { if (typing === again) again.dispatchEvent(new Event("change", { bubbles: true })); }, { once: true });
+    }
+    again.setSelectionRange(...selected);
   };
 }
 

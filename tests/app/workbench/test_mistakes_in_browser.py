@@ -89,6 +89,23 @@ def test_a_refused_value_stays_in_its_field_with_the_reason(page: Page, begun: P
         assert "literal" not in tab.inner_text("#refused")
 
 
+def test_text_and_selection_stay_when_the_panel_is_drawn_again(page: Page, begun: Path):
+    file = begun / "my photographs" / "experiment.toml"
+    with opened(page, begun) as tab:
+        enter(tab, "photographs")
+        name = tab.locator("#field-name")
+        name.press("Control+a")
+        tab.evaluate("workbench.paint()")
+        tab.keyboard.type("shear ")
+        tab.evaluate("workbench.paint()")
+        tab.keyboard.type("two")
+        assert name.input_value() == "shear two"
+        tab.evaluate("workbench.paint()")
+        name.blur()
+        idle(tab)
+        assert 'name = "shear two"' in file.read_text(encoding="utf-8")
+
+
 def test_an_unreadable_photograph_is_stated_and_shows_no_other(page: Page, begun: Path):
     (begun / "my photographs" / "pictures" / "DSC_11.jpg").write_bytes(b"no picture")
     with opened(page, begun) as tab:
