@@ -164,9 +164,14 @@ def expected_rods(tracks: Tracks) -> int:
 
 def enclosed_area(position: Array, radius: Array) -> float:
     """Return the area of the convex hull of circles, from centres (n, 2) and radii (n,) in one unit of length."""
-    angle = np.linspace(0.0, 2.0 * np.pi, RIM_POINTS, endpoint=False)
+    return float(ConvexHull(rim_points(position, radius, RIM_POINTS)).volume)  # an area in the plane
+
+
+def rim_points(position: Array, radius: Array, count: int) -> Array:
+    """Return so many points on the rim of every circle (n count, 2), from centres (n, 2) and radii (n,) in one unit."""
+    angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
     rim = radius[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return float(ConvexHull((position[:, None] + rim).reshape(-1, 2)).volume)  # an area in the plane
+    return (position[:, None] + rim).reshape(-1, 2)
 
 
 def open_sides(walls: WallTracks) -> list[str]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..experiment.experiment import Experiment, GrainGuess
 from ..experiment.photographs import Photographs
 from ..experiment.pictures.image import Image, ImageSelection
+from ..experiment.plausibility import rim_points
 from ..solver.bodies.grains import Array
 
 SMALLEST = 0.05  # quantile of the radii below which nothing is looked for
@@ -118,14 +119,13 @@ def find_missed_rods(image: Image, x: Array, y: Array, radius: Array) -> Array:
 
 def _free_area(rods: Array, smallest: float) -> tuple[NDArray[np.uint8], float, Array]:
     """Draw the area between the rods (h, w), not zero where it is free; pixels per pixel, and the corner [px]."""
-    angle = np.linspace(0.0, 2.0 * np.pi, RIM_POINTS, endpoint=False)
-    rims = rods[:, None, :2] + rods[:, 2, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    rims = rim_points(rods[:, :2], rods[:, 2], RIM_POINTS)
     scale = min(DRAWN / smallest, 1.0)
     # A margin: the transform measures distances to pixels that are not free, not to the border of the picture.
-    corner, far = rims.min(axis=(0, 1)) - 3.0 / scale, rims.max(axis=(0, 1)) + 3.0 / scale
+    corner, far = rims.min(axis=0) - 3.0 / scale, rims.max(axis=0) + 3.0 / scale
     width, height = np.ceil((far - corner) * scale).astype(int) + 1
     free = np.zeros((height, width), np.uint8)
-    hull = cv2.convexHull(((rims.reshape(-1, 2) - corner) * scale).astype(np.float32))
+    hull = cv2.convexHull(((rims - corner) * scale).astype(np.float32))
     cv2.fillConvexPoly(free, np.rint(hull).astype(np.int32), 255)
     for px, py, r in np.column_stack([(rods[:, :2] - corner) * scale, rods[:, 2] * scale]):
         cv2.circle(free, (round(px), round(py)), round(r), 0, cv2.FILLED)
