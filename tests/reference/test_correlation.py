@@ -9,14 +9,16 @@ import pytest
 from numba import njit
 from rodsight.tracking.correlation import kernels
 from rodsight.tracking.correlation.coarse_to_fine import select_distinct_places
-from rodsight.tracking.correlation.interpolation import interpolate_cubic, interpolate_quintic, sample
 from rodsight.tracking.correlation.noise import image_noise
 from rodsight.tracking.correlation.search import angles_to_try, disc_offsets, search_patch
 from rodsight.tracking.correlation.search_parts import search_parts
-from rodsight.tracking.correlation.spline_vectors import add_projections, read_cubic, read_quintic
-from rodsight.tracking.correlation.splines import quintic_coefficients, spline_coefficients
+from rodsight.tracking.correlation.splines import spline_coefficients
 from rodsight.tracking.detection.edges import sample_rays
-from scipy.ndimage import correlate, gaussian_filter
+from rodsight.tracking.interpolation.projections import project_cubic, project_quintic
+from rodsight.tracking.interpolation.recursive_filter import quintic_coefficients
+from rodsight.tracking.interpolation.spline_values import interpolate_cubic, interpolate_quintic, sample
+from rodsight.tracking.interpolation.spline_vectors import read_cubic, read_quintic
+from scipy.ndimage import correlate, correlate1d, gaussian_filter
 
 from tests.reference.twins.correlation import (
     best_places,
@@ -46,8 +48,12 @@ def read_all(coefficients, at, finely):
 
 
 @njit
-def project(sums, data, p, g):
-    add_projections(sums, data, p, g)
+def project(coefficients, blocks, count, corner, place, level, sums, finely):
+    x, y, cos, sin = place
+    if finely:
+        project_quintic(coefficients, blocks, count, corner[0], corner[1], x, y, cos, sin, level, sums)
+    else:
+        project_cubic(coefficients, blocks, count, corner[0], corner[1], x, y, cos, sin, level, sums)
 
 
 @pytest.fixture(scope="module")
@@ -70,12 +76,19 @@ def fill(picture, coefficients=None):
     return good, data, inverse, statistics
 
 
+def packed(data):
+    blocks = np.empty((-(-len(data) // kernels.LANES), kernels.COLUMNS, kernels.LANES), np.float32)
+    kernels.pack_blocks(data, blocks)
+    return blocks
+
+
 def fit_rigidly(coefficients, data, inverse, max_shift, min_zncc, tolerance, limit, pose, fit):
     coarse = np.empty((5, 5))
     kernels.fill_coarse(data, coarse)
     kernels.fit_rigid(
-        coefficients, data, coarse, inverse, REACH, max_shift, min_zncc, tolerance, limit, pose, fit, np.empty(4)
-    )
+        coefficients, packed(data), len(data), coarse, inverse, REACH, max_shift, min_zncc, tolerance, limit, pose, fit,
+        np.empty(kernels.SUMS),
+    )  # fmt: skip
 
 
 def moved(picture, shift, angle, gain=1.3, level=-20.0):
@@ -107,12 +120,44 @@ def test_whole_rows_of_taps_read_the_same_spline(picture):
         assert found == pytest.approx([value(coefficients, x, y, degree) for x, y in at], rel=SINGLE)
 
 
-def test_projections_are_accumulated():
+@pytest.mark.parametrize("finely", [True, False])
+@pytest.mark.parametrize(("angle", "count"), [(0.0, 16), (0.4, 21), (-2.5, 7)])
+def test_the_photograph_is_projected_on_the_images_of_a_patch(picture, finely, angle, count):
     rng = np.random.default_rng(3)
-    data, sums = rng.normal(size=(7, 6)).astype(np.float32), rng.normal(size=4)
-    expected = sums + 2.5 * data[3, 2:].astype(np.float64)
-    project(sums, data, 3, np.float32(2.5))
-    assert sums == pytest.approx(expected, rel=1e-15)
+    data = rng.normal(size=(count, 6)).astype(np.float32)
+    data[:, :2] *= 4.0
+    coefficients, level = quintic_coefficients(picture), np.float32(103.0)
+    c, s = np.cos(angle), np.sin(angle)
+    x, y = 30.3 + c * data[:, 0] - s * data[:, 1], 27.8 + s * data[:, 0] + c * data[:, 1]
+    grey = values(coefficients, x, y, 5 if finely else 3) - level
+    sums = np.full(kernels.SUMS, np.nan)
+    place = tuple(np.float32([27.3, 26.8, c, s]))
+    project(coefficients, packed(data), count, (3, 1), place, level, sums, finely)
+    expected = [*(grey @ data[:, 2:]), grey.sum(), grey @ grey]
+    assert sums == pytest.approx(expected, abs=1e-5 * np.abs(grey).sum() * np.abs(data).max())
+    assert sums[-1] == pytest.approx(expected[-1], rel=1e-5)
+
+
+@pytest.mark.parametrize("count", [1, 8, 9, kernels.COARSE_PIXELS * 3 + 5])
+def test_the_pixels_of_the_coarse_steps_are_the_first_of_the_blocks(count):
+    data = np.random.default_rng(4).normal(size=(count, 6)).astype(np.float32)
+    blocks = packed(data).transpose(0, 2, 1).reshape(-1, 6)
+    stride = kernels.coarse_stride(count)
+    coarse = data[::stride]
+    assert kernels.count_coarse(count) == len(coarse)
+    assert np.array_equal(blocks[: len(coarse)], coarse)
+    assert sorted(blocks[:count].tolist()) == sorted(data.tolist())
+    assert not blocks[count:].any()
+
+
+@pytest.mark.parametrize("shape", [(60, 64), (3, 7), (1, 40), (45, 1), (33, 100)])
+def test_recursive_filters_invert_the_sampled_quintic_spline(shape):
+    image = np.random.default_rng(5).uniform(0.0, 255.0, shape).astype(np.float32)
+    coefficients = quintic_coefficients(image).astype(np.float64)
+    for axis in (0, 1):
+        taps = np.array([1.0, 26.0, 66.0, 26.0, 1.0]) / 120.0
+        coefficients = correlate1d(coefficients, taps, axis=axis, mode="mirror")
+    assert coefficients == pytest.approx(image, abs=1e-3)
 
 
 def test_a_subset_of_pixels_gives_the_same_direction():

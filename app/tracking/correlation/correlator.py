@@ -101,9 +101,9 @@ class Correlator:
 
         def run_chunk(part: slice) -> None:
             kernels.fit_all(
-                coefficients, patches.data, patches.start, patches.coarse_inverse, patches.hessian_inverse,
-                patches.radius, rows[part], max_shift[part], min_zncc[part], self._tolerance, limit, pose[part],
-                fit[part],
+                coefficients, patches.blocks, patches.start, patches.pixel_count, patches.coarse_inverse,
+                patches.hessian_inverse, patches.radius, rows[part], max_shift[part], min_zncc[part], self._tolerance,
+                limit, pose[part], fit[part],
             )  # fmt: skip
 
         self._run_in_chunks(len(rows), run_chunk)
@@ -135,8 +135,8 @@ class Correlator:
         def one(k: int) -> None:
             row = rows[k]
             kernels.fit_robust(
-                coefficients, patches.data[patches.start[row] : patches.start[row + 1]], patches.radius[row],
-                max_shift[k], noise, gain[k], offset[k], 2 * self._limit, pose[k], fit[k], covariance[k],
+                coefficients, patches.pixels(row), patches.radius[row], max_shift[k], noise, gain[k], offset[k],
+                2 * self._limit, pose[k], fit[k], covariance[k],
             )  # fmt: skip
 
         self._run_each(len(rows), one)

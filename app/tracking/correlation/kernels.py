@@ -14,7 +14,8 @@ import numpy as np
 from numba import njit
 
 from ...solver.array_copies import copy_matrix
-from .spline_vectors import add_projections, read_cubic, read_quintic
+from ..interpolation.projections import COLUMNS, LANES, SUMS, project_cubic, project_quintic
+from ..interpolation.spline_vectors import read_quintic
 
 CONVERGED = 0
 LEFT_IMAGE = 1
@@ -174,6 +175,30 @@ def coarse_stride(count):
 
 
 @njit(cache=True, nogil=True)
+def count_coarse(count):
+    """Number of pixels of a patch that the coarse steps use."""
+    stride = coarse_stride(count)
+    return (count + stride - 1) // stride
+
+
+@njit(cache=True, nogil=True)
+def pack_blocks(data, blocks):
+    """Write the pixels (p, 6) in blocks (b, 6, 8), those of the coarse steps first; zeros follow the last."""
+    count = len(data)
+    stride = coarse_stride(count)
+    for b in range(len(blocks)):
+        for k in range(COLUMNS):
+            for lane in range(LANES):
+                blocks[b, k, lane] = 0.0
+    place = 0
+    for first in range(stride):
+        for p in range(first, count, stride):
+            for k in range(COLUMNS):
+                blocks[place // LANES, k, place % LANES] = data[p, k]
+            place += 1
+
+
+@njit(cache=True, nogil=True)
 def fill_coarse(data, coarse):
     """Write the inverse normal matrix (5, 5) of jx, jy, jr, f and 1 over the pixels of the coarse steps."""
     normal = np.zeros((5, 5))
@@ -187,67 +212,8 @@ def fill_coarse(data, coarse):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _project_finely(coefficients, data, corner, place, level, sums):
-    """Interpolate the photograph, less `level`, at the pixels of a patch and project it on the patch's images.
-
-    Parameters
-    ----------
-    coefficients, data
-        As of `fit_rigid`.
-    corner : (2,) tuple of int
-        Column and row that places are relative to, so that single precision suffices.
-    place : (4,) tuple of float32
-        x and y of the centre, relative to the corner [px], cosine and sine of the rotation.
-    level : float
-        Grey level that is subtracted.
-    sums : (4,) array
-        The sums of f, jx, jy and jr times the photograph are added.
-
-    Returns
-    -------
-    tuple of float
-        Sum of the photograph and of its square.
-
-    Notes
-    -----
-    A loop for each spline keeps its constants in registers: a fit takes a tenth less than with one loop for both.
-    """
-    ox, oy, cos, sin = place
-    s0, s1 = 0.0, 0.0
-    for p in range(len(data)):
-        dx, dy = data[p, 0], data[p, 1]
-        x = ox + cos * dx - sin * dy
-        y = oy + sin * dx + cos * dy
-        ix, iy = int(x), int(y)
-        column, row = corner[0] + ix, corner[1] + iy
-        g = read_quintic(coefficients, column, row, x - np.float32(ix), y - np.float32(iy)) - level
-        s0 += g
-        s1 += np.float64(g) * g
-        add_projections(sums, data, p, g)
-    return s0, s1
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _project_coarsely(coefficients, data, stride, corner, place, level, sums):
-    """Do as `_project_finely` with the cubic spline's taps at every pixel of a stride."""
-    ox, oy, cos, sin = place
-    s0, s1 = 0.0, 0.0
-    for p in range(0, len(data), stride):
-        dx, dy = data[p, 0], data[p, 1]
-        x = ox + cos * dx - sin * dy
-        y = oy + sin * dx + cos * dy
-        ix, iy = int(x), int(y)
-        column, row = corner[0] + ix, corner[1] + iy
-        g = read_cubic(coefficients, column, row, x - np.float32(ix), y - np.float32(iy)) - level
-        s0 += g
-        s1 += np.float64(g) * g
-        add_projections(sums, data, p, g)
-    return s0, s1
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def fit_rigid(
-    coefficients, data, coarse, hessian_inverse, radius, max_shift, min_zncc, tolerance, limit, pose, fit, sums
+    coefficients, blocks, count, coarse, hessian_inverse, radius, max_shift, min_zncc, tolerance, limit, pose, fit, sums
 ):
     """Fit one patch by inverse-compositional Gauss-Newton.
 
@@ -255,7 +221,11 @@ def fit_rigid(
     ----------
     coefficients : (h, w) array
         Quintic spline coefficients of the photograph.
-    data, coarse, hessian_inverse, radius
+    blocks : (b, 6, 8) array
+        The pixels of the patch, see `pack_blocks`.
+    count : int
+        Their number.
+    coarse, hessian_inverse, radius
         The patch, see `fill_patch` and `fill_coarse`.
     max_shift : float
         Distance from the start [px] beyond which the fit is stopped.
@@ -270,7 +240,7 @@ def fit_rigid(
     fit : (FIT_COLUMNS,) array
         Receives ZNCC, residual variance of a pixel [grey²], gain, offset [grey] (image = gain · f + offset, f of unit
         norm), fraction of the pixels used, code.
-    sums : (4,) array
+    sums : (6,) array
         Workspace.
 
     Notes
@@ -281,8 +251,7 @@ def fit_rigid(
     last ones.
     """
     height, width = coefficients.shape
-    count = len(data)
-    stride = coarse_stride(count)
+    coarse_count = count_coarse(count)
     x0, y0 = pose[0], pose[1]
     margin = int(radius) + 2
     fit[CODE] = UNFINISHED
@@ -297,15 +266,14 @@ def fit_rigid(
         ox, oy = np.float32(pose[0] - bx), np.float32(pose[1] - by)
         cos, sin = np.float32(np.cos(pose[2])), np.float32(np.sin(pose[2]))
         level = coefficients[int(pose[1]), int(pose[0])]
-        corner, place = (bx, by), (ox, oy, cos, sin)
-        sums[:] = 0.0
         if fine:
-            s0, s1 = _project_finely(coefficients, data, corner, place, level, sums)
+            used = count
+            project_quintic(coefficients, blocks, used, bx, by, ox, oy, cos, sin, level, sums)
         else:
-            s0, s1 = _project_coarsely(coefficients, data, stride, corner, place, level, sums)
-        used = count if fine else (count + stride - 1) // stride
+            used = coarse_count
+            project_cubic(coefficients, blocks, used, bx, by, ox, oy, cos, sin, level, sums)
+        sf, sx, sy, sr, s0, s1 = sums[0], sums[1], sums[2], sums[3], sums[4], sums[5]
         power = s1 - s0 * s0 / used
-        sf, sx, sy, sr = sums[0], sums[1], sums[2], sums[3]
         if fine:
             gain = sf
             h = hessian_inverse
@@ -343,14 +311,15 @@ def fit_rigid(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def fit_all(
-    coefficients, data, start, coarse, hessian_inverse, radius, rows, max_shift, min_zncc, tolerance, limit, pose, fit
-):
-    """Fit the patches `rows` (m,), the pixels of patch k being data[start[k] : start[k + 1]]; see `fit_rigid`."""
-    sums = np.empty(4)
+    coefficients, blocks, start, count, coarse, hessian_inverse, radius, rows, max_shift, min_zncc, tolerance, limit,
+    pose, fit,
+):  # fmt: skip
+    """Fit the patches `rows` (m,), of count[k] pixels in blocks[start[k] : start[k + 1]]; see `fit_rigid`."""
+    sums = np.empty(SUMS)
     for m in range(len(rows)):
         k = rows[m]
         fit_rigid(
-            coefficients, data[start[k] : start[k + 1]], coarse[k], hessian_inverse[k], radius[k],
+            coefficients, blocks[start[k] : start[k + 1]], count[k], coarse[k], hessian_inverse[k], radius[k],
             max_shift[m], min_zncc[m], tolerance, limit, pose[m], fit[m], sums,
         )  # fmt: skip
 

@@ -33,8 +33,9 @@ class Patches:
     norm: Array  # (n,) [grey] norm of the disc about its mean
     mean: Array  # (n,) [grey]
     correlation_length: Array  # (n,) [px], of the speckle
-    data: Image  # (p, 6) pixels of all patches, concatenated; columns see kernels
-    start: NDArray[np.intp]  # (n + 1,) first row of each patch in `data`
+    pixel_count: NDArray[np.intp]  # (n,)
+    blocks: Image  # (b, 6, 8) pixels of all patches, eight in a block, concatenated; columns see kernels
+    start: NDArray[np.intp]  # (n + 1,) first block of each patch
     hessian_inverse: Array  # (n, 3, 3) [px², px, 1] for a reference of unit norm
     coarse_inverse: Array  # (n, 5, 5) the same with gain and offset, for the pixels of the coarse steps
     reference: Pyramid
@@ -48,14 +49,16 @@ class Patches:
         """Cut the discs out of a photograph: centre (n, 2) [px], radius (n,) [px]."""
         n = len(centre)
         usable = np.zeros(n, dtype=np.bool_)
-        inverse, statistics, data = np.full((n, 3, 3), np.nan), np.full((n, 3), np.nan), []
+        inverse, statistics, blocks = np.full((n, 3, 3), np.nan), np.full((n, 3), np.nan), []
+        count = np.zeros(n, np.intp)
         coarse = np.full((n, 5, 5), np.nan)
         for k in range(n):
             patch, usable[k] = _cut_patch(photograph, centre[k], float(radius[k]), inverse[k], coarse[k], statistics[k])
-            data.append(patch)
+            blocks.append(_pack(patch))
+            count[k] = len(patch)
         return cls(
             centre, radius, usable, statistics[:, 0], statistics[:, 1], np.sqrt(statistics[:, 2]),
-            *_concatenate(data), inverse, coarse, photograph, centre, np.zeros(n), np.zeros(n), {},
+            count, *_concatenate(blocks), inverse, coarse, photograph, centre, np.zeros(n), np.zeros(n), {},
         )  # fmt: skip
 
     def renew(self, photograph: Image, rows: NDArray[np.intp], pose: Array, sigma: Array) -> Patches:
@@ -82,7 +85,8 @@ class Patches:
         inverse, coarse = self.hessian_inverse.copy(), self.coarse_inverse.copy()
         source_centre, source_rotation = self.source_centre.copy(), self.source_rotation.copy()
         source_variance = self.source_variance.copy()
-        data, renewed = np.split(self.data, self.start[1:-1]), dict(self.renewed)
+        blocks, renewed = np.split(self.blocks, self.start[1:-1]), dict(self.renewed)
+        count = self.pixel_count.copy()
         height, width = photograph.shape
         for k, row in enumerate(rows):
             side = self.radius[row] + SURROUNDINGS
@@ -94,23 +98,26 @@ class Patches:
             new_statistics = np.full(3, np.nan)
             patch, good = _cut_patch(crop, centre, float(self.radius[row]), new_inverse, new_coarse, new_statistics)
             if good:
-                data[row], inverse[row], coarse[row], statistics[row] = patch, new_inverse, new_coarse, new_statistics
+                blocks[row], count[row], statistics[row] = _pack(patch), len(patch), new_statistics
+                inverse[row], coarse[row] = new_inverse, new_coarse
                 renewed[int(row)] = crop
                 source_centre[row], source_rotation[row], source_variance[row] = centre, pose[k, 2], sigma[k] ** 2
-        packed, start = _concatenate(data)
+        packed, start = _concatenate(blocks)
         return replace(
             self, norm=statistics[:, 0], mean=statistics[:, 1], correlation_length=np.sqrt(statistics[:, 2]),
-            data=packed, start=start, hessian_inverse=inverse, coarse_inverse=coarse, source_centre=source_centre,
-            source_rotation=source_rotation, source_variance=source_variance, renewed=renewed,
+            pixel_count=count, blocks=packed, start=start, hessian_inverse=inverse, coarse_inverse=coarse,
+            source_centre=source_centre, source_rotation=source_rotation, source_variance=source_variance,
+            renewed=renewed,
         )  # fmt: skip
 
     def source(self, row: int) -> Pyramid:
         """The image that a grain's disc was cut from."""
         return self.renewed.get(int(row), self.reference)
 
-    @property
-    def pixel_count(self) -> NDArray[np.int64]:
-        return np.diff(self.start)
+    def pixels(self, row: int) -> Image:
+        """Return the pixels (p, 6) of one patch; columns see `kernels`."""
+        blocks = self.blocks[self.start[row] : self.start[row + 1]]
+        return np.ascontiguousarray(blocks.transpose(0, 2, 1).reshape(-1, kernels.COLUMNS)[: self.pixel_count[row]])
 
     @property
     def sigma_per_noise(self) -> Array:
@@ -156,6 +163,13 @@ def _cut_patch(
     return data, bool(good)
 
 
-def _concatenate(data: list[Image]) -> tuple[Image, NDArray[np.intp]]:
-    start = np.cumsum([0, *(len(patch) for patch in data)], dtype=np.intp)
-    return np.concatenate([np.empty((0, 6), np.float32), *data]), start
+def _pack(patch: Image) -> Image:
+    """The pixels (p, 6) of a patch in blocks."""
+    blocks = np.empty((-(-len(patch) // kernels.LANES), kernels.COLUMNS, kernels.LANES), np.float32)
+    kernels.pack_blocks(patch, blocks)
+    return blocks
+
+
+def _concatenate(blocks: list[Image]) -> tuple[Image, NDArray[np.intp]]:
+    start = np.cumsum([0, *(len(patch) for patch in blocks)], dtype=np.intp)
+    return np.concatenate([np.empty((0, kernels.COLUMNS, kernels.LANES), np.float32), *blocks]), start

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .spline_vectors import read_cubic
+from ..interpolation.spline_vectors import read_cubic
 
 # Two maxima at one place are distinct when their angles differ by more than this [rad]. A maximum is as wide as a
 # speckle, and a speckle at the rim of a distinguishable patch spans a much smaller angle.

@@ -12,18 +12,13 @@ import cv2
 import numpy as np
 
 from ...experiment.pictures.image import Image
+from ..interpolation.recursive_filter import quintic_coefficients
 
 # Unser, Aldroubi & Eden 1993: the inverse of the sampled cubic B-spline is sqrt(3) z^|k|, z = sqrt(3) − 2.
 # The first tap that is omitted is 1e-6 of the middle one: a thousandth of a grey level.
 HALF_WIDTH = 10
 POLE = np.sqrt(3.0) - 2.0
 PREFILTER = (np.sqrt(3.0) * POLE ** np.abs(np.arange(-HALF_WIDTH, HALF_WIDTH + 1))).astype(np.float32)
-
-# The inverse of the sampled quintic B-spline (1, 26, 66, 26, 1)/120: the first tap that is omitted is 1e-6 as well.
-QUINTIC_HALF_WIDTH = 17
-_ANGLE = 2.0 * np.pi * np.arange(64) / 64
-_RESPONSE = np.fft.ifft(120.0 / (66.0 + 52.0 * np.cos(_ANGLE) + 2.0 * np.cos(2.0 * _ANGLE))).real
-QUINTIC_PREFILTER = _RESPONSE[np.abs(np.arange(-QUINTIC_HALF_WIDTH, QUINTIC_HALF_WIDTH + 1))].astype(np.float32)
 
 # Fraction of the variance of white noise that quintic interpolation halfway between two pixels preserves.
 HALFWAY_VARIANCE = 0.8365
@@ -32,14 +27,6 @@ HALFWAY_VARIANCE = 0.8365
 def spline_coefficients(image: Image) -> Image:
     """Compute the cubic spline coefficients c of an image (H, W), mirrored at its borders."""
     filtered = cv2.sepFilter2D(image, cv2.CV_32F, PREFILTER, PREFILTER, borderType=cv2.BORDER_REFLECT_101)
-    return np.asarray(filtered, dtype=np.float32)
-
-
-def quintic_coefficients(image: Image) -> Image:
-    """Compute the quintic spline coefficients c of an image (H, W), mirrored at its borders."""
-    filtered = cv2.sepFilter2D(
-        image, cv2.CV_32F, QUINTIC_PREFILTER, QUINTIC_PREFILTER, borderType=cv2.BORDER_REFLECT_101
-    )
     return np.asarray(filtered, dtype=np.float32)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
-from ..correlation.interpolation import interpolate_cubic
+from ..interpolation.spline_values import interpolate_cubic
 from ..short_sort import ascending_order
 
 # Samples along a radius [1/px].

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..correlation.interpolation import interpolate_cubic
 from ..detection.edges import fit_points, weighted_median
+from ..interpolation.spline_values import interpolate_cubic
 from ..short_sort import ascending_order
 
 # Samples along a ray [1/px]; a slope is read over half a pixel to each side.

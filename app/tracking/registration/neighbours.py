@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from ...solver.bodies.grains import Array
+from .neighbour_kernels import find_nearest, fit_motion
 
 NEIGHBOUR_COUNT = 12
 
@@ -46,34 +47,26 @@ def local_motion(known: Array, displacement: Array, query: Array, *, exclude_sel
     available = min(wanted, len(known))
     if m == 0 or available <= int(exclude_self):
         return np.full((m, 2), np.nan), np.full(m, np.nan)
-    distance, index = KDTree(known).query(query, k=available)
-    distance, index = distance.reshape(m, available), index.reshape(m, available)
-    if exclude_self:
-        distance, index = distance[:, 1:], index[:, 1:]
-    moved = displacement[index]  # (m, k, 2)
-    median = np.median(moved, axis=1)
-    deviation = np.linalg.norm(moved - median[:, None, :], axis=2)
-    median_deviation = np.median(deviation, axis=1)
-    if index.shape[1] < AFFINE_COUNT:
-        return median, median_deviation
+    index = _nearest(known, query, available)[:, int(exclude_self) :]
+    prediction, median_deviation = np.empty((m, 2)), np.empty(m)
+    fit_motion(
+        np.ascontiguousarray(known, np.float64), np.ascontiguousarray(displacement, np.float64),
+        np.ascontiguousarray(query, np.float64), np.ascontiguousarray(index), AFFINE_COUNT, prediction,
+        median_deviation,
+    )  # fmt: skip
+    return prediction, median_deviation
 
-    farthest = np.maximum(distance[:, -1:], 1e-9)
-    # The quarter of a pixel keeps all neighbours where the motion is perfectly uniform.
-    agree = deviation < 4.0 * median_deviation[:, None] + 0.25
-    weight = np.exp(-2.0 * (distance / farthest) ** 2) * agree
-    design = np.concatenate(
-        [np.ones((*index.shape, 1)), (known[index] - query[:, None, :]) / farthest[:, :, None]], axis=2
-    )
-    residual = moved - median[:, None, :]
-    normal = np.einsum("mk,mki,mkj->mij", weight, design, design)
-    # Neighbours on one line do not determine the gradient across it, which is regularised to zero.
-    normal[:, 1, 1] += 1e-2
-    normal[:, 2, 2] += 1e-2
-    right = np.einsum("mk,mki,mkj->mij", weight, design, residual)
-    normal[:, 0, 0] += 1e-9
-    solution = np.linalg.solve(normal, right)
-    misfit = np.linalg.norm(residual - np.einsum("mki,mij->mkj", design, solution), axis=2)
-    return median + solution[:, 0, :], np.median(misfit, axis=1)
+
+def _nearest(known: Array, query: Array, count: int) -> NDArray[np.intp]:
+    """Rows (m, count) of the known grains nearest to each place, nearest first."""
+    if not (np.isfinite(known).all() and np.isfinite(query).all()):
+        raise ValueError("neighbours are sought of finite positions")
+    index = np.empty((len(query), count), np.intp)
+    find_nearest(
+        np.ascontiguousarray(known, np.float64), np.ascontiguousarray(query, np.float64), index,
+        np.empty((len(query), count)),
+    )  # fmt: skip
+    return index
 
 
 def nearby_median(known: Array, value: Array, query: Array, count: int = NEIGHBOUR_COUNT) -> Array:
@@ -81,8 +74,7 @@ def nearby_median(known: Array, value: Array, query: Array, count: int = NEIGHBO
     if len(known) == 0:
         return np.full(len(query), np.nan)
     count = min(count, len(known))
-    _, index = KDTree(known).query(query, k=count)
-    return np.median(value[index.reshape(len(query), count)], axis=1)
+    return np.median(value[_nearest(known, query, count)], axis=1)
 
 
 def overlaps(position: Array, radius: Array, allowed: float) -> NDArray[np.intp]:

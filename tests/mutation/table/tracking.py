@@ -23,12 +23,18 @@ MUTANTS = [
     *mutants_of(
         f"{REGISTRATION}/neighbours.py",
         f"{TESTS}/test_neighbours.py",
-        ("distance, index = distance[:, 1:], index[:, 1:]", "distance, index = distance[:, :-1], index[:, :-1]"),
-        ("(distance / farthest) ** 2) * agree", "(distance / farthest) ** 2)"),
-        ("4.0 * median_deviation[:, None] + 0.25", "4.0 * median_deviation[:, None]"),
+        ("[:, int(exclude_self) :]", "[:, : available - int(exclude_self)]"),
         ("AFFINE_COUNT = 6", "AFFINE_COUNT = 60"),
-        ("np.median(misfit, axis=1)", "median_deviation"),
         ("- allowed * smaller", "- 3.0 * allowed * smaller"),
+    ),
+    *mutants_of(
+        f"{REGISTRATION}/neighbour_kernels.py",
+        f"{TESTS}/test_neighbours.py",
+        ("if not deviation[k] < limit:", "if False:"),
+        ("4.0 * median_deviation[q] + 0.25", "4.0 * median_deviation[q]"),
+        ("deviation[k] = np.sqrt(miss_x**2 + miss_y**2)", "pass"),
+        ("(ring - 1) * side", "ring * side"),
+        ("distance[q, k - 1] > apart", "distance[q, k - 1] < apart"),
     ),
     *mutants_of(
         f"{REGISTRATION}/rescue.py",

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rodsight.tracking.correlation.interpolation import interpolate_quintic
 from rodsight.tracking.correlation.search import disc_offsets, search_patch
 from rodsight.tracking.correlation.search_parts import search_parts
-from rodsight.tracking.correlation.splines import quintic_coefficients, spline_coefficients
+from rodsight.tracking.correlation.splines import spline_coefficients
+from rodsight.tracking.interpolation.recursive_filter import quintic_coefficients
+from rodsight.tracking.interpolation.spline_values import interpolate_quintic
 from rodsight.tracking.tracker import Tracker
 from rodsight.tracks import TrackStatus
 from scipy.ndimage import map_coordinates, spline_filter

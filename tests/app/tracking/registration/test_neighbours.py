@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rodsight.tracking.registration.neighbour_kernels import find_nearest
 from rodsight.tracking.registration.neighbours import local_motion, nearby_median, overlaps
 
 
@@ -96,6 +97,27 @@ def test_without_neighbours_the_motion_is_unknown(count: int, exclude_self: bool
     predicted, median_deviation = local_motion(known, known, query, exclude_self=exclude_self)
     assert np.isnan(predicted).all()
     assert np.isnan(median_deviation).all()
+
+
+@pytest.mark.parametrize(("width", "height"), [(300.0, 200.0), (2000.0, 3.0), (0.0, 500.0), (0.0, 0.0)])
+@pytest.mark.parametrize(("count", "wanted"), [(40, 12), (300, 5), (7, 7), (1, 1)])
+def test_the_nearest_are_found_in_their_order(width: float, height: float, count: int, wanted: int) -> None:
+    rng = np.random.default_rng(4)
+    known = rng.uniform(0.0, 1.0, (count, 2)) * [width, height]
+    # Places among the grains, beside them and far away.
+    query = np.concatenate([known, known[:1] + rng.normal(0.0, 400.0, (60, 2))])
+    index, distance = np.empty((len(query), wanted), np.intp), np.empty((len(query), wanted))
+    find_nearest(known, query, index, distance)
+    all_distances = np.linalg.norm(known[None] - query[:, None], axis=2)
+    assert distance == pytest.approx(np.sort(all_distances, axis=1)[:, :wanted], abs=1e-9)
+    assert np.take_along_axis(all_distances, index, 1) == pytest.approx(distance, abs=1e-9)
+    assert all(len(set(row)) == wanted for row in index.tolist())
+
+
+def test_neighbours_of_unknown_places_are_an_error() -> None:
+    known = np.zeros((3, 2))
+    with pytest.raises(ValueError, match="finite"):
+        nearby_median(known, np.ones(3), np.array([[np.nan, 0.0]]), 1)
 
 
 def test_a_nearby_median_is_of_the_nearest_alone() -> None:
