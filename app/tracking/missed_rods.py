@@ -19,6 +19,8 @@ from ..experiment.photographs import Photographs
 from ..experiment.pictures.image import Image, ImageSelection
 from ..experiment.plausibility import rim_points
 from ..solver.bodies.grains import Array
+from ..solver.boundary.size_classes import group_readings
+from .detection.detect import Detection, DetectionSettings, MissedGrainSearch, detect_grains
 
 SMALLEST = 0.05  # quantile of the radii below which nothing is looked for
 FITS = 0.85  # of the smallest radius: a place so wide may hold a rod that others hide in part
@@ -32,6 +34,49 @@ ALIKE = 4.0  # robust standard deviations of brightness and contrast within whic
 LEAST_SD = np.array([3.0, 0.1])  # of brightness [grey] and of the logarithm of the contrast
 UNDECIDED = 0.5  # fraction of the pores that look like rods beyond which nothing is reported
 FEWEST = 5  # rods, and pores
+ROUNDS = 8  # of the search: every rod that is found shows the places beside it better
+
+
+def detect_rods(image: Image, settings: DetectionSettings | None = None) -> Detection:
+    """Detect the rods of a photograph, and those that were missed at first.
+
+    Parameters
+    ----------
+    image : (H, W)
+        The photograph [grey].
+    settings : DetectionSettings, optional
+
+    Notes
+    -----
+    Near places that look like rods, circles of the known sizes are searched for once more at full resolution: on a
+    shrunk copy coarse paint hides the rims. They must pass the tests of all others and look like rods. Where radii are
+    unknown, the sizes are those of the rods that were found; without distinct sizes nothing is added.
+    """
+    settings = settings if settings is not None else DetectionSettings()
+    found = detect_grains(image, settings)
+    search: MissedGrainSearch | None = None
+    radii = np.array(settings.radii) if settings.radii else _sizes(found.radius)
+    if radii is None:
+        return found
+    for _ in range(ROUNDS):
+        places = find_missed_rods(image, found.x, found.y, found.radius)
+        if len(places) == 0:
+            break
+        search = MissedGrainSearch(image, radii, settings) if search is None else search
+        new = search.find_near(found, places[:, :2])
+        looks = _looks_of(image, np.column_stack([found.x, found.y, found.radius]))
+        assert looks is not None  # of too few rods there are no places
+        new = new.select(_are_alike(image, np.column_stack([new.x, new.y, new.radius]), INSIDE, looks))
+        if new.count == 0:
+            break
+        found = found.join(new)
+    return found
+
+
+def _sizes(radius: Array) -> Array | None:
+    """Return the mean radius of every size (k,); None without distinct sizes."""
+    size_class = group_readings(radius)
+    return None if size_class is None else np.bincount(size_class, radius) / np.bincount(size_class)
 
 
 def describe_missed_rods(experiment: Experiment, rods: GrainGuess) -> list[str]:
@@ -101,20 +146,27 @@ def find_missed_rods(image: Image, x: Array, y: Array, radius: Array) -> Array:
     places = _find_places(free, scale, corner, smallest, float(radius.max()))
     if len(places) == 0 or len(pores) < FEWEST:
         return np.empty((0, 3))
+    looks = _looks_of(image, rods)
+    if looks is None or _are_alike(image, pores, INSIDE_PORE, looks).mean() > UNDECIDED:
+        return np.empty((0, 3))
+    return places[_are_alike(image, places, INSIDE, looks)]
+
+
+def _looks_of(image: Image, rods: Array) -> tuple[Array, Array] | None:
+    """Return median and robust standard deviation (2,) of the appearance of rods (n, 3); None of too few."""
     look = _appearance(image, rods, INSIDE)
     look = look[np.isfinite(look).all(axis=1)]
     if len(look) < FEWEST:
-        return np.empty((0, 3))
+        return None
     middle = np.median(look, axis=0)
-    spread = 1.4826 * np.median(np.abs(look - middle), axis=0) + LEAST_SD
+    return middle, 1.4826 * np.median(np.abs(look - middle), axis=0) + LEAST_SD
 
-    def alike(discs: Array, part: float) -> NDArray[np.bool_]:
-        away = np.abs(_appearance(image, discs, part) - middle) / spread
-        return np.nan_to_num(away, nan=np.inf).max(axis=1) < ALIKE
 
-    if alike(pores, INSIDE_PORE).mean() > UNDECIDED:
-        return np.empty((0, 3))
-    return places[alike(places, INSIDE)]
+def _are_alike(image: Image, discs: Array, part: float, looks: tuple[Array, Array]) -> NDArray[np.bool_]:
+    """Mark the discs (n, 3) a part of which looks as rods do."""
+    middle, sd = looks
+    away = np.abs(_appearance(image, discs, part) - middle) / sd
+    return np.nan_to_num(away, nan=np.inf).max(axis=1, initial=0.0) < ALIKE
 
 
 def _free_area(rods: Array, smallest: float) -> tuple[NDArray[np.uint8], float, Array]:

@@ -32,10 +32,11 @@ from ..tracks import Tracks, WallTracks
 from . import DETECTIONS, PICTURES
 from .corner_discs import CORNERS, follow_corners
 from .detection.channels import count_clear, count_discs, is_coloured
-from .detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
+from .detection.detect import Detection, DetectionSettings, refine_grains
 from .detection.false_detections import describe_channels, describe_false_detections
 from .follow import Execution, FollowedWalls, ReferenceGrains, Series, follow_photographs, follow_walls
 from .fringes import measure_fringes
+from .missed_rods import detect_rods
 from .outline.missing_discs import add_missing_discs
 from .registration.manual_poses import ManualPoses
 from .report.page import TrackingReportData
@@ -217,10 +218,10 @@ def _detect(
         settings = DetectionSettings(tuple(classes / scale.mean_size), tuning.radius_range)
     except ValueError as error:
         raise InputError(experiment.file, f"key photographs.radii = {list(section.radii)}", str(error)) from None
-    detection = detect_grains(first, settings)
+    detection = detect_rods(first, settings)
     if section.follow == "outline":
         # Dark discs on a light background are detected as well.
-        dark = detect_grains(np.float32(FULL_SCALE) - first, settings)
+        dark = detect_rods(np.float32(FULL_SCALE) - first, settings)
         detection = max(detection, dark, key=lambda found: float(found.quality @ found.radius))
         detection = add_missing_discs(first, detection)
     centres = np.stack([detection.x, detection.y], axis=1)
@@ -232,7 +233,7 @@ def _detect(
     for message in messages:
         notify(message)
     if within is not None:
-        detection = _select(detection, within)
+        detection = detection.select(within)
         centres = centres[within]
     if len(classes):
         radius = detection.radius * scale.mean_size
@@ -273,12 +274,6 @@ def _inside_walls(position: Array, walls: WallTracks) -> NDArray[np.bool_]:
     depth, _ = bounding_distance(walls.endpoints[0], walls.sides, position)
     within = np.asarray((depth > 0.0).all(axis=1))
     return within if within.sum() > 0.2 * len(within) else np.ones_like(within)
-
-
-def _select(detection: Detection, rows: NDArray[np.bool_]) -> Detection:
-    return Detection(
-        detection.x[rows], detection.y[rows], detection.radius[rows], detection.sigma[rows], detection.quality[rows]
-    )
 
 
 def _bar_depth(experiment: Experiment, first: Image, walls: WallTracks, scale: Scale, radius: float) -> Array:

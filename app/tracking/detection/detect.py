@@ -24,11 +24,8 @@ from .rings import Circles, find_circles, not_overlapping, without_overlap
 
 # Least half width of the search for the edges of a ring [px], whose centre has an error of that size or larger.
 RING_UNCERTAINTY = 3.0
-# Greatest error of a small circle's centre, as a fraction of its radius.
-SMALL_FRACTION = 0.2
-
-# Standard deviation of the error that a narrow gap adds to the steepest points' centre [px].
-ROUGH_SIGMA = 0.15
+SMALL_FRACTION = 0.2  # greatest error of a small circle's centre, as a fraction of its radius
+ROUGH_SIGMA = 0.15  # [px] standard deviation of the error that a narrow gap adds to the steepest points' centre
 
 # Greatest standard deviation of a centre [px], or as a fraction of the radius, of any circle and of a small one.
 MAX_SIGMA = 1.0
@@ -41,29 +38,30 @@ CLOSE_FRACTION = 1.0 / 3.0
 RADIUS_RANGE = (8.0, 160.0)
 LARGEST_FRACTION = 0.3
 
-# Least default radius of bright discs [px], which are distinguished from paint and noise at smaller sizes.
-MIN_RADIUS = 4.0
+MIN_RADIUS = 4.0  # [px] least default one of bright discs, which at smaller sizes are like paint and noise
 # Discs that cover this fraction of a photograph's bright area are its grains, with the second as a factor of the least
 # quality.
 CLEAN_COVER, CLEAN_QUALITY = 0.93, 0.6
-# Greatest range of the light on such discs, as a fraction of the contrast: more is texture.
-MAX_LIGHT_RANGE = 0.2
+MAX_LIGHT_RANGE = 0.2  # greatest range of the light on such discs, as a fraction of the contrast: more is texture
 # Least covered fraction of the bright area that found grains leave, a part of which is always without shape.
 CLEAN_COVER_REST = 0.8
 DISC_PASSES = 4
 # Fraction of the bright area left, below which all grains are found.
 MAX_BRIGHT_LEFT = 0.01
 
-# Least radius [px] on a copy of a soft photograph: smaller ones are not shrunk any further.
-LEAST_ON_COPY = 8.0
-
-# Ratio of successive radii in the search for circles of unknown radius.
-SCAN_STEP = 1.06
-
+LEAST_ON_COPY = 8.0  # [px] least radius on a copy of a soft photograph: smaller ones are not shrunk any further
+SCAN_STEP = 1.06  # ratio of successive radii in the search for circles of unknown radius
 
 # Fractions of an outline that are seen: of a circle that is certain, and of one that may be accidental, of which noise
 # shows a third.
 CLEAR, FAINT, FEWEST_CLEAR = 0.55, 0.35, 20
+
+# Search for missed grains: least slope along a ring at full resolution, where coarse paint shows no slope on a shrunk
+# copy; greatest overlap of such a ring with a found grain before it is measured, as a fraction of the smaller radius;
+# distance of its centre from a place [radii]; found grains by which blur and shading of the rims are known; greatest
+# relative difference of a measured radius from the size.
+FINE_SCORE, FINE_OVERLAP, NEAR_PLACE, REFERENCE_GRAINS, SAME_SIZE = 0.08, 0.1, 3.0, 60, 0.05
+TOUCHING = 0.15  # greatest overlap of touching grains, as a fraction of the smaller radius
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +94,16 @@ class Detection:
     @property
     def count(self) -> int:
         return len(self.x)
+
+    def select(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Detection:
+        """Return some of the grains, or all in another order."""
+        return Detection(self.x[rows], self.y[rows], self.radius[rows], self.sigma[rows], self.quality[rows])
+
+    def join(self, other: Detection) -> Detection:
+        """Return these grains and others, from top to bottom."""
+        both = [np.concatenate([getattr(each, name) for each in (self, other)]) for name in self.__slots__]
+        order = np.lexsort((both[0], both[1]))
+        return Detection(*(column[order] for column in both))
 
 
 def detect_grains(image: Image, settings: DetectionSettings | None = None) -> Detection:
@@ -162,15 +170,18 @@ def _detect(image: Image, settings: DetectionSettings) -> Detection:
             table = _judge(measurer, rough, table, known, settings.min_quality)
     found = _refine(measurer, table[:, 0], table[:, 1], table[:, 2], fixed_radius=known)
     order = np.lexsort((found.x, found.y))
-    # A circle that cannot be measured closely is not a grain, or too little of it is in view.
-    most = np.minimum(MAX_SIGMA, MAX_RELATIVE_SIGMA_SMALL * found.radius)
-    good = found.sigma < np.maximum(most, MAX_RELATIVE_SIGMA * found.radius)
-    good &= found.quality > CLOSE_FRACTION * settings.min_quality
+    good = _measured_closely(found, settings.min_quality)
     if not known:
         good &= (found.radius > 0.9 * smallest) & (found.radius < 1.1 * radii[-1])
         good &= ~_accidental(found.radius, found.quality, good)
-    order = order[good[order]]
-    return Detection(found.x[order], found.y[order], found.radius[order], found.sigma[order], found.quality[order])
+    return found.select(order[good[order]])
+
+
+def _measured_closely(found: Detection, min_quality: float) -> NDArray[np.bool_]:
+    """Mark circles (n,) that could be measured closely: others are no grains, or too little of them is in view."""
+    most = np.minimum(MAX_SIGMA, MAX_RELATIVE_SIGMA_SMALL * found.radius)
+    good = found.sigma < np.maximum(most, MAX_RELATIVE_SIGMA * found.radius)
+    return good & (found.quality > CLOSE_FRACTION * min_quality)
 
 
 def _accidental(radius: Array, quality: Array, good: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -183,6 +194,39 @@ def _accidental(radius: Array, quality: Array, good: NDArray[np.bool_]) -> NDArr
         return np.zeros(len(radius), np.bool_)
     same_size = (radius > 0.9 * radius[clear].min()) & (radius < 1.1 * radius[clear].max())
     return (quality < FAINT) & ~same_size
+
+
+class MissedGrainSearch:
+    """Search at full resolution for grains of known sizes that the search of `detect_grains` missed."""
+
+    def __init__(self, image: Image, radii: Array, settings: DetectionSettings) -> None:
+        """Prepare a photograph (H, W) [grey] for grains of radii (k,) [px], which are exact where settings hold any."""
+        self._settings, self._radii = settings, radii
+        self._copy = sharpest_copy(image, float(radii.min()) / LEAST_ON_COPY)
+        sizes = np.unique(radii) / self._copy.factor
+        self._rough = find_circles(self._copy.image, sizes, min_score=FINE_SCORE, finest=True)
+        self._measurer = CircleMeasurer(self._copy.image, float(sizes.max()))
+
+    def find_near(self, found: Detection, places: Array) -> Detection:
+        """Find grains within three radii of places (m, 2) [px] that pass the tests of `detect_grains` beside others."""
+        least, copy, rough = self._settings.min_quality, self._copy, self._rough
+        old = np.column_stack([*copy.to_copy(found.x, found.y), found.radius / copy.factor])
+        away = KDTree(np.column_stack(copy.to_copy(*places.T))).query(np.column_stack([rough.x, rough.y]))[0]
+        near = rough.select(away < NEAR_PLACE * rough.radius)
+        near = near.select(_beside(np.column_stack([near.x, near.y, near.radius]), old, FINE_OVERLAP))
+        table = _judge(self._measurer, near, np.empty((0, 4)), True, least)
+        table = table[_beside(table[:, :3], old, TOUCHING)]
+        reference = old[:: max(len(old) // REFERENCE_GRAINS, 1)]
+        both = np.concatenate([table[:, :3], reference]) if len(table) else table[:, :3]
+        refined = _refine(self._measurer, *both.T, fixed_radius=bool(self._settings.radii))
+        good = _measured_closely(refined, least) & (np.arange(refined.count) < len(table))
+        good &= np.abs(refined.radius / np.maximum(both[:, 2], 1.0) - 1.0) < SAME_SIZE
+        return _on_photograph(refined.select(good), copy, self._settings.radii)
+
+
+def _beside(circles: Array, found: Array, overlap: float) -> NDArray[np.bool_]:
+    """Mark the circles (c, 3) that overlap none of the found ones (n, 3) by more than a fraction of a radius."""
+    return not_overlapping(circles, found, np.full_like(circles, np.nan), allowed=overlap)
 
 
 def refine_grains(image: Image, x: Array, y: Array, radius: Array, *, fixed_radius: bool = True) -> Detection:
@@ -270,7 +314,7 @@ def _judge_discs(
 
 
 def _judge(
-    measurer: CircleMeasurer, rough: Circles, table: Array, known: bool, min_quality: float, overlap: float = 0.15
+    measurer: CircleMeasurer, rough: Circles, table: Array, known: bool, min_quality: float, overlap: float = TOUCHING
 ) -> Array:
     """Add the candidates that are grains and overlap no better one to the table x, y, radius, quality (c, 4).
 

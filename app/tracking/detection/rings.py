@@ -8,6 +8,7 @@ from functools import partial
 import cv2
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
@@ -37,8 +38,12 @@ class Circles:
     score: Array  # (c,) mean inward slope along the circle, as a fraction of a full edge's
     error: Array  # (c,) [px] greatest error of the centre
 
+    def select(self, rows: NDArray[np.bool_]) -> Circles:
+        """Return some of the circles, rows (c,)."""
+        return Circles(self.x[rows], self.y[rows], self.radius[rows], self.score[rows], self.error[rows])
 
-def find_circles(image: Image, radii: Array, *, min_score: float) -> Circles:
+
+def find_circles(image: Image, radii: Array, *, min_score: float, finest: bool = False) -> Circles:
     """Find the local maxima, over position, of the mean inward slope along circles.
 
     Slopes are relative to the local contrast and limited to that of a full edge, so that neither uneven light nor a
@@ -52,12 +57,16 @@ def find_circles(image: Image, radii: Array, *, min_score: float) -> Circles:
         Radii that are tried [px]. Those of circles wider than the photograph find none.
     min_score : float
         Least mean slope, as a fraction of a full edge's.
+    finest : bool
+        Search on the photograph itself, which takes longer, instead of shrunk copies.
     """
     radii = radii[2.0 * radii < max(image.shape)]
     if len(radii) == 0:
         return Circles(*np.empty((5, 0)))
     least = max(int(radii.min() / MIN_COARSE_RADIUS), 1)
-    factors = np.maximum((radii / COARSE_RADIUS).astype(np.intp), least)
+    factors = np.ones(len(radii), np.intp)
+    if not finest:
+        factors = np.maximum((radii / COARSE_RADIUS).astype(np.intp), least)
     found = []
     for factor in np.unique(factors):
         slopes = _slopes(shrink(image, int(factor)), int(tile_size(float(radii.max())) / factor))

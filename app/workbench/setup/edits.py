@@ -21,8 +21,9 @@ from ...process.errors import InputError
 from ...solver.bodies.grains import Array
 from ...solver.bodies.wall_shapes import STRAIGHT
 from ...tracking.detection.clicked_circle import fit_clicked
-from ...tracking.detection.detect import Detection, DetectionSettings, detect_grains
+from ...tracking.detection.detect import Detection, DetectionSettings
 from ...tracking.detection.scale_comparison import find_other_scale, packed_fraction
+from ...tracking.missed_rods import detect_rods
 from ...tracking.walls.inner_edge import depth_in_circles, find_bars, lines_to_corners, snap_to_edge
 from .circles import arcs_table, circles_of, moved_corners, renamed
 from .draft import Draft, as_table
@@ -260,7 +261,7 @@ def detect(
             raise InputError("--radius-range", "{:g}:{:g}".format(*radius_range), str(error)) from None
         _compare_scales(image, classes, None)
         raise InputError("photographs.radii", str(list(radii)), str(error)) from None
-    detection = detect_grains(image, settings)
+    detection = detect_rods(image, settings)
     if classes:
         _compare_scales(image, classes, detection)
     return _within_walls(detection, found)

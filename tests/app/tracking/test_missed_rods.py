@@ -1,4 +1,4 @@
-"""Rods that detection missed are found by their looks; holes of the packing are not."""
+"""Rods that detection missed are found by their looks and fitted; holes of the packing are not."""
 
 from __future__ import annotations
 
@@ -6,11 +6,15 @@ import cv2
 import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment, read_grain_guess
-from rodsight.tracking.missed_rods import MOST, describe_missed_rods, find_missed_rods
+from rodsight.tracking.detection.detect import Detection, DetectionSettings, detect_grains
+from rodsight.tracking.missed_rods import MOST, describe_missed_rods, detect_rods, find_missed_rods
 from scipy.ndimage import gaussian_filter
+from scipy.spatial import KDTree
 
-RADIUS, SIDE = 20.0, 10
+RADIUS, SMALLER, SIDE = 20.0, 19.5, 10
 MISSED, HOLES = [23, 57, 61], [34, 76]
+COARSE_RADIUS, COARSE_SIDE, COARSE_HOLES = 30.0, 7, [16, 30]
+AT_LEAST = 12  # rods with coarse paint that only the search at full resolution finds
 
 
 def _draw(kind: str) -> tuple[np.ndarray, np.ndarray]:
@@ -22,7 +26,8 @@ def _draw(kind: str) -> tuple[np.ndarray, np.ndarray]:
     speckles = np.where(gaussian_filter(rng.normal(size=(size, size)), 2.0) > 0.0, 220.0, 30.0)
     image = np.full((size, size), ground)
     for k in sorted(set(range(SIDE**2)) - set(HOLES)):
-        disc = cv2.circle(np.zeros((size, size), np.uint8), tuple(np.rint(centre[k]).astype(int)), int(RADIUS), 1, -1)
+        place, radius = np.rint(16.0 * centre[k]).astype(int), round(16.0 * (SMALLER if k == MISSED[0] else RADIUS))
+        disc = cv2.circle(np.zeros((size, size), np.uint8), tuple(place), radius, 1, -1, shift=4)
         image = np.where(disc > 0, speckles if rod is None else rod, image)
     return (gaussian_filter(image, 0.7) + rng.normal(0.0, 2.0, image.shape)).astype(np.float32), centre
 
@@ -82,3 +87,80 @@ def test_the_sentence_names_the_widest_place(tmp_path) -> None:
     assert one.startswith("1 place looks like a rod between the others and was not found, the widest at column 1")
     (several,) = sentences([*HOLES, *MISSED])
     assert several.startswith("3 places look like rods between the others and were not found")
+
+
+def _draw_coarse() -> tuple[np.ndarray, np.ndarray]:
+    """A photograph of rods with coarse speckles in a triangular packing with holes, and the centres of the rods."""
+    rng, r = np.random.default_rng(2), COARSE_RADIUS
+    k = np.arange(COARSE_SIDE**2)
+    column, row = k % COARSE_SIDE, k // COARSE_SIDE
+    centre = 50.0 + r + 2.02 * r * np.column_stack([column + 0.5 * (row % 2), 0.88 * row])
+    size = int(centre.max() + r) + 60
+    image = np.full((size, size), 60.0)
+    for x, y in np.delete(centre, COARSE_HOLES, axis=0):
+        top, left = int(y - r - 4), int(x - r - 4)
+        rows, columns = np.mgrid[top : top + 69, left : left + 69]
+        speckles = np.where(gaussian_filter(rng.normal(size=rows.shape), 0.11 * r) > 0.0, 225.0, 35.0)
+        inside = np.clip(r - np.hypot(columns - x, rows - y) + 0.5, 0.0, 1.0)
+        image[rows, columns] = image[rows, columns] * (1.0 - inside) + speckles * inside
+    image = gaussian_filter(image, 0.8) + rng.normal(0.0, 2.5, image.shape)
+    return image.astype(np.float32), np.delete(centre, COARSE_HOLES, axis=0)
+
+
+def test_rods_with_coarse_paint_are_found_at_full_resolution_and_holes_are_not() -> None:
+    image, centre = _draw_coarse()
+    settings = DetectionSettings(radii=(COARSE_RADIUS,))
+    before, after = detect_grains(image, settings), detect_rods(image, settings)
+    assert after.count >= before.count + AT_LEAST
+    away, nearest = KDTree(centre).query(np.column_stack([after.x, after.y]))
+    assert np.median(away) < 0.3
+    assert (away < 4.0 * after.sigma + 1.0).all()  # paint at a rim hides half of it
+    assert len(np.unique(nearest)) == after.count
+    assert (np.lexsort((after.x, after.y)) == np.arange(after.count)).all()
+    assert (after.radius == COARSE_RADIUS).all()
+
+
+def _detect_without(monkeypatch: pytest.MonkeyPatch, left_out: list[int], centre: np.ndarray) -> None:
+    """Let detection miss the rods at some centres."""
+
+    def detect(image: np.ndarray, settings: DetectionSettings) -> Detection:
+        found = detect_grains(image, settings)
+        away = KDTree(centre[left_out]).query(np.column_stack([found.x, found.y]))[0]
+        return found.select(away > RADIUS)
+
+    monkeypatch.setattr("rodsight.tracking.missed_rods.detect_grains", detect)
+
+
+@pytest.mark.parametrize("radii", [(RADIUS,), ()])
+def test_missed_rods_are_measured_like_the_others(monkeypatch: pytest.MonkeyPatch, radii: tuple[float, ...]) -> None:
+    image, centre = _draw("plain")
+    settings = DetectionSettings(radii)
+    all_rods = detect_grains(image, settings)
+    _detect_without(monkeypatch, MISSED, centre)
+    found = detect_rods(image, settings)
+    assert found.count == all_rods.count == SIDE**2 - len(HOLES)
+    np.testing.assert_allclose(found.x, all_rods.x, atol=0.1)
+    np.testing.assert_allclose(found.y, all_rods.y, atol=0.1)
+    np.testing.assert_allclose(found.radius, all_rods.radius, atol=0.1)
+
+
+def test_a_disc_that_does_not_look_like_the_rods_is_not_added(monkeypatch: pytest.MonkeyPatch) -> None:
+    image, centre = _draw("plain")
+    x, y = np.rint(centre[HOLES[0]]).astype(int)
+    cv2.circle(image, (int(x), int(y)), int(RADIUS), 110.0, -1)  # a bolt beside the rods
+    _detect_without(monkeypatch, [HOLES[0], MISSED[0]], centre)
+    found = detect_rods(image, DetectionSettings((RADIUS,)))
+    assert found.count == SIDE**2 - len(HOLES)
+    assert np.hypot(found.x - x, found.y - y).min() > RADIUS
+
+
+def test_rods_without_distinct_sizes_are_left_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    image, centre = _draw("plain")
+    rng = np.random.default_rng(3)
+    one = np.ones(len(centre) - len(MISSED))
+    x, y, radius = _given(centre, MISSED)
+    given = Detection(x, y, radius * rng.uniform(0.7, 1.0, len(x)), 0.1 * one, one)
+    monkeypatch.setattr("rodsight.tracking.missed_rods.detect_grains", lambda image, settings: given)
+    assert len(find_missed_rods(image, given.x, given.y, given.radius)) > 0
+    assert detect_rods(image) is given
+    assert detect_rods(image, DetectionSettings((RADIUS,))).count > len(x)  # stated sizes are known
