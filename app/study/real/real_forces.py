@@ -82,6 +82,7 @@ class RealFrame:
     precision: float  # fraction of the contacts with force in the run that truly carry force
     recall: float  # fraction of the true contacts with force that the run lists
     covered: tuple[float, float]  # fractions of the true f_n within one and two standard deviations; NaN without these
+    direction_sd: float  # [°] standard deviation of the principal direction as the run states it; NaN: none
 
     def direction_error(self, source: str) -> float:
         """Return the error of a field's principal direction [°], −90 … 90."""
@@ -105,6 +106,15 @@ class RealStudy:
         pairs = np.array([(getattr(row, source).total, row.total) for row in self.frames])
         pairs = pairs[np.isfinite(pairs).all(axis=1)]
         return pearson(*pairs.T) if len(pairs) >= LEAST_FRAMES else float("nan")
+
+    def direction_coverage(self) -> tuple[float, float, float]:
+        """Return the mean standard deviation of the direction [°], and how often one and two cover the truth."""
+        rows = [row for row in self.frames if np.isfinite(row.direction_sd + row.direction_error("ours"))]
+        if not rows:
+            return float("nan"), float("nan"), float("nan")
+        sd = np.array([row.direction_sd for row in rows])
+        error = np.abs([row.direction_error("ours") for row in rows])
+        return float(sd.mean()), float((error < sd).mean()), float((error < 2.0 * sd).mean())
 
     def count_excess(self) -> tuple[int, int]:
         """Count the frames whose trust exceeds r of the run by more than EXCESS, and the frames with a trust."""
@@ -153,7 +163,8 @@ def study_real(results: Results, truth: TruthContacts, sides: Sequence[float], s
             "ceiling": _nearest_equilibrium(packing, snapshots[k], exact, ours.contacts, baseline.candidates),
         }
         covered = _coverage(ours, None if frame.fn_sd is None else frame.fn_sd[listed], exact)
-        rows.append(_compare(k, found, exact, baseline.candidates, snapshots[k], (frame.trust, sides[k], covered)))
+        known = frame.trust, sides[k], covered, float(np.rad2deg(results.statistics[k].principal_direction_sd))
+        rows.append(_compare(k, found, exact, baseline.candidates, snapshots[k], known))
         if k == shown:
             drawn = exact, found
     assert drawn is not None
@@ -185,7 +196,7 @@ def as_json(study: RealStudy) -> dict[str, object]:
     }
     truth = {
         name: [_plain(getattr(row, name)) for row in study.frames]
-        for name in ("direction", "total", "trust", "sides", "precision", "recall")
+        for name in ("direction", "direction_sd", "total", "trust", "sides", "precision", "recall")
     }
     mean = {
         source: {name: mean_of([getattr(getattr(row, source), name) for row in study.frames]) for name in names[:3]}
@@ -264,10 +275,10 @@ def _compare(
     exact: FrameField,
     near: Keys,
     snapshot: Snapshot,
-    known: tuple[float, float, tuple[float, float]],
+    known: tuple[float, float, tuple[float, float], float],
 ) -> RealFrame:
-    """Compare fields with the truth; known: trust, correlation of both readings, and coverage of the run."""
-    trust, sides, covered = known
+    """Compare fields with the truth; known: trust, correlation of both readings, coverage, sd of the direction."""
+    trust, sides, covered, direction_sd = known
     pairs = join_keys(near, candidates["ours"].key, exact.key)
     true = match_values(pairs, exact.key, exact.force[:, 0])
     pressure = _pressure(exact)
@@ -289,6 +300,7 @@ def _compare(
     return RealFrame(
         k, **found, direction=_direction(exact.normal_only(), snapshot.position), total=_total(exact), trust=trust,
         sides=sides, precision=agreement.contact_precision, recall=listed.contact_recall, covered=covered,
+        direction_sd=direction_sd,
     )  # fmt: skip
 
 

@@ -67,8 +67,18 @@ def describe_limits(study: RealStudy) -> str:
     return (
         f"{read}True principal direction {_format(direction, 1)}°. Of the contacts with force in the run, "
         f"{_format(precision, 3)} truly carry force; of the true contacts with force, {_format(recall, 3)} are listed. "
-        f"{_describe_trust(study)} {_describe_coverage(study)}"
+        f"{_describe_trust(study)} {_describe_coverage(study)} {_describe_direction(study)}"
     ).rstrip()
+
+
+def _describe_direction(study: RealStudy) -> str:
+    sd, one, two = study.direction_coverage()
+    if not np.isfinite(sd):
+        return ""
+    return (
+        f"The standard deviation of the principal direction is {sd:.1f}° on average; one and two cover the true one in "
+        f"{100 * one:.0f} and {100 * two:.0f} % of the frames."
+    )
 
 
 def _describe_coverage(study: RealStudy) -> str:

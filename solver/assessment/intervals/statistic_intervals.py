@@ -2,7 +2,8 @@
 
 σ = c √(1 − T), for positive quantities times their value, with a constant for every statistic and evidence source
 (fitted.toml names command, data and date). Positions alone know little of sliding, so stresses read from them err by
-degrees although the forces correlate.
+degrees although the forces correlate. Of the principal direction it is the error of the stress deviator, from which
+`direction_sd` follows: the less the stresses differ, the less their direction is known.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from ...statistics.frame_statistics import FrameStatistics
 from ..fitted import FITTED
 from .force_intervals import EvidenceSource, evidence_source_of, penalty_of, usual_trust
 
-# By statistic: where motion, motion and positions, positions were used; rad of angles.
+# By statistic: where motion, motion and positions, positions were used; rad of angles, of the principal direction a
+# component of the deviator over the mean stress.
 CONSTANT: dict[str, tuple[float, float, float]] = {
     name: tuple(values) for name, values in FITTED["statistic_intervals"]["constant"].items()
 }
@@ -31,6 +33,7 @@ SIZED = frozenset({"pressure", "sigma_1", "sigma_2", "mean_fn", "max_fn"})  # un
 # Error for every e-fold by which the friction differs, in the unit of the constant.
 FRICTION_ERROR: dict[str, float] = FITTED["statistic_intervals"]["friction_error"]
 MIN_PENALTY = 0.03  # 1 − T below which the simulated packings give no information
+UNKNOWN_DIRECTION = math.pi / math.sqrt(12.0)  # [rad] standard deviation of an axis of which nothing is known
 
 
 def with_sd(statistics: FrameStatistics, frame: FrameForces, *, scale_is_known: bool, moved: bool) -> FrameStatistics:
@@ -54,6 +57,9 @@ def with_sd(statistics: FrameStatistics, frame: FrameForces, *, scale_is_known: 
         for name in CONSTANT
         if scale_is_known or name not in SIZED
     }
+    added["principal_direction_sd"] = direction_sd(
+        statistics.sigma_1, statistics.sigma_2, added["principal_direction_sd"]
+    )
     return replace(statistics, **added)
 
 
@@ -71,6 +77,26 @@ def widen_for_friction(statistics: FrameStatistics, given: float, measured: floa
 def sd_of(name: str, value: float, source: EvidenceSource, trust: float) -> float:
     """Standard deviation of one statistic, in its unit."""
     return CONSTANT[name][source] * size_of(name, value) * float(np.sqrt(max(float(penalty_of(trust)), MIN_PENALTY)))
+
+
+def direction_sd(sigma_1: float, sigma_2: float, deviator_sd: float) -> float:
+    """Compute the standard deviation of the principal direction [rad] from that of the deviator.
+
+    Parameters
+    ----------
+    sigma_1, sigma_2 : float
+        Principal stresses [Pa], compression positive.
+    deviator_sd : float
+        Standard deviation s of a component of the deviator, (σ_xx − σ_yy, 2 σ_xy) over σ_1 + σ_2.
+
+    Notes
+    -----
+    ½ s / √(d² + 3 s²/π²) with d = (σ_1 − σ_2) / (σ_1 + σ_2): ½ s/d of a large deviator, and of none π/√12, the standard
+    deviation of an axis that may have any direction.
+    """
+    total = sigma_1 + sigma_2
+    deviator = (sigma_1 - sigma_2) / total if total > 0.0 else 0.0
+    return 0.5 * deviator_sd / math.hypot(deviator, 0.5 * deviator_sd / UNKNOWN_DIRECTION)
 
 
 def size_of(name: str, value: float) -> float:

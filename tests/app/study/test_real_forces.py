@@ -45,6 +45,20 @@ def test_a_direction_is_compared_without_its_sense(results: Results, same: RealS
         assert abs(row.direction_error("ours")) < 10.0  # the true direction is computed without tangential forces
 
 
+def test_the_standard_deviation_of_the_direction_is_held_against_its_error(results: Results, same: RealStudy) -> None:
+    error = [abs(row.direction_error("ours")) for row in same.frames]
+    sds = np.radians([1.1 * error[0], 0.6 * error[1]])
+    stated = [replace(each, principal_direction_sd=sd) for each, sd in zip(results.statistics, sds, strict=True)]
+    found = study_real(replace(results, statistics=stated), own_forces(results), [0.7, float("nan")])
+    mean, one, two = found.direction_coverage()
+    assert mean == pytest.approx(np.degrees(sds).mean())
+    assert (one, two) == (0.5, 1.0)
+    assert "cover the true one in 50 and 100 % of the frames" in describe_limits(found)
+    unknown = [replace(each, principal_direction_sd=float("nan")) for each in stated]
+    none = study_real(replace(results, statistics=unknown), own_forces(results), [0.7, float("nan")])
+    assert "standard deviation of the principal direction" not in describe_limits(none)
+
+
 def test_the_ceiling_is_nearer_to_the_truth_than_a_baseline(same: RealStudy) -> None:
     for row in same.frames:
         assert row.ceiling.r > row.static.r

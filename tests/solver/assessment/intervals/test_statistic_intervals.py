@@ -4,7 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.solver.assessment.intervals.statistic_intervals import CONSTANT, SIZED, widen_for_friction, with_sd
+from rodsight.solver.assessment.intervals.statistic_intervals import (
+    CONSTANT,
+    SIZED,
+    direction_sd,
+    widen_for_friction,
+    with_sd,
+)
 from rodsight.solver.quantity import quantities
 from rodsight.solver.statistics.frame_statistics import FrameStatistics
 
@@ -29,7 +35,7 @@ def test_every_constant_has_a_field_and_its_unit():
 
 def test_standard_deviations_increase_with_the_root_of_the_penalty(run):
     sure, penalised = statistics_with_sd(run, 0.9), statistics_with_sd(run, 0.6)
-    for name in CONSTANT:
+    for name in set(CONSTANT) - {"principal_direction"}:  # whose standard deviation is bounded
         ratio = getattr(penalised, f"{name}_sd") / getattr(sure, f"{name}_sd")
         assert ratio == pytest.approx(2.0), name
     assert sure.pressure_sd == pytest.approx(CONSTANT["pressure"][0] * sure.pressure * np.sqrt(0.1))
@@ -66,3 +72,25 @@ def test_a_wrong_friction_adds_its_error_to_every_statistic_that_depends_on_it(r
     assert after.mean_fn_sd == pytest.approx(np.hypot(before.mean_fn_sd, 0.23 * step * before.mean_fn))
     assert after.friction_angle_sd == pytest.approx(np.hypot(before.friction_angle_sd, 0.14 * step))
     assert after.rattler_count_sd == before.rattler_count_sd
+
+
+def test_the_direction_is_known_as_well_as_the_deviator(run):
+    stated = run.statistics[1]
+    deviator = (stated.sigma_1 - stated.sigma_2) / (stated.sigma_1 + stated.sigma_2)
+    weak = replace(stated, sigma_1=1.001 * stated.sigma_2)
+    frame = replace(run.frames[1], trust=0.9, position_weight=0.5)
+    sd = with_sd(stated, frame, scale_is_known=False, moved=True).principal_direction_sd
+    assert sd == pytest.approx(0.5 * 0.072 * np.sqrt(0.1) / deviator, rel=0.02)
+    assert with_sd(weak, frame, scale_is_known=False, moved=True).principal_direction_sd > 0.85
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.5, 1.0, 2.0, 5.0])
+def test_the_standard_deviation_of_a_direction_is_that_of_deviators_with_errors(ratio):
+    error = 0.03 * np.random.default_rng(1).normal(size=(2, 20_000))
+    angle = 0.5 * np.arctan2(error[1], ratio * 0.03 + error[0])
+    rms = float(np.sqrt(np.mean(angle**2)))
+    assert direction_sd(1.0 + ratio * 0.03, 1.0 - ratio * 0.03, 0.03) == pytest.approx(rms, rel=0.25)
+
+
+def test_without_any_stress_no_direction_is_known():
+    assert direction_sd(0.0, 0.0, 0.1) == pytest.approx(np.pi / np.sqrt(12.0))
