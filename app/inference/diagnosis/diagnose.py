@@ -29,7 +29,6 @@ from .direct_tests import (
     examine_rotations,
     examine_sizes,
     examine_wall_places,
-    examine_wall_times,
     examine_walls,
     find_impossible_poses,
 )
@@ -38,6 +37,7 @@ from .resistance import examine_resistance
 from .rivals import rivals_of
 from .sections import examine_sections
 from .trial import TRIAL_PHOTOGRAPHS, Trial, select_window, solve_trial, trial_score
+from .wall_times import examine_wall_times
 
 # Rise of arctanh r that a rival must reach over the given input, and over all other causes. On correct input, and where
 # the model lacks physics that no rival has, the highest rise was 0.13 (seed 40, six scenarios).

@@ -34,7 +34,6 @@ STILL = 1.5  # … or over that of noise alone
 MOVES = 4.0  # noise that the median step must exceed for that
 DRIFT_SIGMAS = 15.0  # standard deviations of a position by which rods may leave or penetrate a wall …
 DRIFT = 0.02  # … and fraction of the mean radius
-LAGGING = 2.0  # times what rods may leave or penetrate a wall: walls off by so much may lag
 BEYOND = 0.1  # mean radius by which rods may stand beyond a wall
 USUAL, BEYOND_USUAL = 0.99, 1.5  # quantile of all overlaps, and times it that an outlier overlaps another body
 MISSING = 0.03  # fraction of the poses that may be missing
@@ -270,32 +269,6 @@ def examine_wall_places(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     return found
 
 
-def examine_wall_times(tracks: Tracks, walls: WallTracks) -> list[Finding]:
-    """Look for straight walls that fit the rods of the photograph before or after better than those of their own."""
-    straight, frames = np.flatnonzero(walls.sides == STRAIGHT).tolist(), tracks.frame_count
-    if not straight or frames < 4:
-        return []
-    allowed = max(DRIFT_SIGMAS * float(np.nanmedian(tracks.position_sigma)), DRIFT * float(tracks.radius.mean()))
-
-    def misfit(shift: int) -> float:
-        """Greatest median distance of the walls from the rods of photographs k − shift [m]."""
-        numbers = range(1, frames - 1)
-        gaps = np.abs([[_near_gap(tracks, walls, k, w, k + shift) for k in numbers] for w in straight])
-        return float(np.max(np.median(gaps, axis=1))) if np.isfinite(gaps).all() else np.nan
-
-    own = misfit(0)
-    if not own > LAGGING * allowed:
-        return []
-    for shift, words in ((1, "late"), (-1, "early")):
-        other = misfit(shift)
-        if other < allowed:
-            evidence = (
-                f"the walls are one photograph {words}: rods are {1e3 * own:.2g} mm off, else {1e3 * other:.2g} mm"
-            )
-            return [finding("walls_shifted", evidence)]
-    return []
-
-
 def _shear_rate(tracks: Tracks, k: int) -> float:
     """Rate of shear [1/s] of the step to photograph k; NaN with too few rods."""
     both, time = tracks.present_in(k - 1) & tracks.present_in(k), float(tracks.time[k] - tracks.time[k - 1])
@@ -352,12 +325,10 @@ def _known_gaps(tracks: Tracks, walls: WallTracks, w: int, order: int) -> Iterat
     return (gap for gap in gaps if np.isfinite(gap))
 
 
-def _near_gap(
-    tracks: Tracks, walls: WallTracks, k: int, w: int, at: int | None = None, *, nearest: int = NEAREST
-) -> float:
-    """Gap [m] between a wall and one of the nearest rods beside it; at: photograph of the wall, k by default."""
+def _near_gap(tracks: Tracks, walls: WallTracks, k: int, w: int, *, nearest: int = NEAREST) -> float:
+    """Gap [m] between a wall and one of the nearest rods beside it."""
     here = np.flatnonzero(tracks.present_in(k))
-    ends = walls.endpoints[k if at is None else at, w]
+    ends = walls.endpoints[k, w]
     here = here[beside_wall(ends, None, tracks.position[k, here], np.zeros(len(here)))]
     if len(here) < nearest:
         return np.nan

@@ -32,7 +32,7 @@ TRUE_CAUSE: dict[ScenarioName, tuple[str, ...]] = {
     "shuffled": ("photographs_swapped",), "duplicate_frame": ("photograph_repeated",),
     "theta_sign": ("rotation_sign",), "theta_zero": ("rotation_zero",), "theta_degrees": ("rotation_in_degrees",),
     "mu_01": ("friction",), "mu_05": ("friction",), "mu_low": ("friction",), "mu_high": ("friction",),
-    "walls_late": ("walls_shifted",), "top_fixed": ("wall_at_rest", "wall_misplaced"),
+    "walls_late": ("walls_shifted",), "left_late": ("walls_shifted",), "top_fixed": ("wall_at_rest", "wall_misplaced"),
     "wall_inside": ("wall_misplaced",), "aspect_03": ("stretched_picture",), "aspect_1": ("stretched_picture",),
     "lens_03": ("lens",),
     "soft_stretched": ("stretched_picture",), "softer_stretched": ("stretched_picture",),

@@ -71,6 +71,13 @@ def delay_walls(observed: ObservedData, rng: np.random.Generator) -> ObservedDat
     return replace(observed, endpoints=observed.endpoints[late])
 
 
+def delay_left(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """State the left side half a photograph late."""
+    endpoints, left = observed.endpoints.copy(), observed.wall_names.index("left")
+    endpoints[1:, left] = 0.5 * (observed.endpoints[1:, left] + observed.endpoints[:-1, left])
+    return replace(observed, endpoints=endpoints)
+
+
 def fix_top(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
     """State the plate at rest."""
     endpoints, top = observed.endpoints.copy(), observed.wall_names.index("top")

@@ -25,6 +25,7 @@ BOX_HEIGHT = 1.3  # height of the open box over that of the heap in it
 HEAP_PRESSURE = 500.0  # [Pa] under which a heap is packed before its weight alone acts
 GREATEST_PRESSURE = 3.0  # of isotropic loading, over the initial pressure
 LOAD_AMPLITUDE, LOAD_PERIOD = 0.4, 8  # of oscillating loads: over the pressure, [photographs]
+LOAD_RISE, LATE_FACTOR = 1.05, 2.0  # of stepped loads: of the plate's a photograph, of the side's in the second half
 CORE_ROTATION = 0.02  # [rad] of the core per photograph
 AMPLITUDE = 4  # of cyclic shear [steps]
 RESTS = 8  # relaxations of a heap, at most
@@ -132,6 +133,15 @@ def load_isotropically(cell: ShearCell, loading: LoadingPath) -> Iterator[DemFra
         rise = 1.0 - abs(k - peak) / peak if peak else 0.0
         pressure = loading.settings.pressure * (1.0 + (GREATEST_PRESSURE - 1.0) * rise)
         cell.load(top=pressure * cell.width * length, side=pressure * cell.height * length)
+        yield cell.photograph(cell.rest())
+
+
+def step_loads(cell: ShearCell, loading: LoadingPath) -> Iterator[DemFrame]:
+    """Raise the load on the plate a little every photograph, and double that on the right side once; no step."""
+    length, pressure = loading.settings.length, loading.settings.pressure
+    for k in range(loading.frames):
+        side = pressure * (LATE_FACTOR if k > loading.frames // 2 else 1.0)
+        cell.load(top=LOAD_RISE**k * pressure * cell.width * length, side=side * cell.height * length)
         yield cell.photograph(cell.rest())
 
 

@@ -34,6 +34,7 @@ from .input_errors import (
     add_outliers,
     confuse_classes,
     correlate_noise,
+    delay_left,
     delay_walls,
     displace_one_pose,
     distort_picture,
@@ -62,6 +63,7 @@ from .loading_paths import (
     shear_cyclically,
     shear_purely,
     shear_under_loads,
+    step_loads,
     tilt_heap,
     turn_core,
 )
@@ -150,6 +152,10 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
         "stiff, so that almost nothing slides",
         RISING,
     ),
+    "stepped_loads": Scenario(
+        "the load on the plate rises by 5 % a photograph, that on the right side doubles once; both are measured",
+        LoadingPath(step_loads, 0.0, measured=("top", "right")),
+    ),
     "rising_corners": Scenario("the same; walls end where the bars meet", RISING, state_corners),
     "gravity": Scenario(
         "a heap with a free surface, pushed by its right wall; no plate",
@@ -229,6 +235,10 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
         LoadingPath(tilt_heap, 1.0, settings=HEAP, open_top=True),
     ),
     "power_law": Scenario("sheared; radii 1:6, most of them small", replace(MOVED, sizes=_choose_by_power_law)),
+    "moving": Scenario(
+        "sheared, photographed while it moves: rods without contact are not at rest",
+        _sheared(moving=True, unbalance_limit=10.0),
+    ),
     "noise_40": Scenario("sheared; 40 µm noise", MOVED, noise=4e-5),
     "correlated_noise": Scenario("sheared; further errors of 10 µm that change slowly", MOVED, correlate_noise),
     "intruder": Scenario(
@@ -304,6 +314,7 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     "mu_01": _wrong("friction stated as .1 instead of .25", misstate_friction(0.1)),
     "mu_05": _wrong("friction stated as .5 instead of .25", misstate_friction(0.5)),
     "walls_late": _wrong("walls one photograph late", delay_walls),
+    "left_late": _wrong("the left side half a photograph late", delay_left),
     "top_fixed": _wrong("the plate stated at rest", fix_top),
     "wall_inside": _wrong("the right side stated 2 mm inside the packing", shift_side_inwards),
     "aspect_03": _wrong("x stretched by .3 %", stretch_picture(0.003)),

@@ -16,7 +16,6 @@ from rodsight.inference.diagnosis.direct_tests import (
     examine_rotations,
     examine_sizes,
     examine_wall_places,
-    examine_wall_times,
     examine_walls,
     find_impossible_poses,
 )
@@ -240,18 +239,3 @@ def test_rods_beyond_a_wall_are_named():
     (found,) = examine_wall_places(tracks, replace(walls, endpoints=inside))
     assert found.cause == "wall_misplaced"
     assert "2 mm beyond wall 'top'" in found.evidence
-
-
-def test_walls_that_lag_behind_are_named():
-    tracks, walls = rolling_tracks(), box()
-    rise = 1e-3 * np.arange(FRAMES)
-    moved = tracks.position + np.stack([np.zeros((FRAMES, N)), rise[:, None] * np.ones(N)], axis=-1)
-    endpoints = walls.endpoints.copy()
-    endpoints[..., 1] += rise[:, None, None]
-    moved, right = replace(tracks, position=moved), replace(walls, endpoints=endpoints)
-    assert examine_wall_times(moved, right) == []
-    assert examine_wall_times(moved, replace(right, endpoints=endpoints - 2e-3)) == []  # no time helps
-    late = endpoints[np.maximum(np.arange(FRAMES) - 1, 0)]
-    (found,) = examine_wall_times(moved, replace(right, endpoints=late))
-    assert found.cause == "walls_shifted"
-    assert "late" in found.evidence

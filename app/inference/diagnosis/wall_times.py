@@ -1,0 +1,124 @@
+"""Walls whose places are those of another time, from the rods that touch them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...results.finding import Finding
+from ...solver.bodies.grains import Array
+from ...solver.bodies.wall_shapes import STRAIGHT, beside_wall, distance_from_walls
+from ...tracks import Tracks, WallTracks
+from .causes import finding
+
+LAGS = np.linspace(-1.5, 1.5, 31)  # [photographs] by which walls may be late
+IN_TIME = int(np.argmin(np.abs(LAGS)))
+LEAST_LAG = 0.15  # [photographs] below which walls count as in time
+NEAR = 1.0  # mean radius up to which the gap of a rod is looked at
+SIGMAS = 3.0  # standard deviations of a position up to which a gap is that of a contact
+ROUGH = 2e-3  # mean radius, the same of rods whose radii are known no better
+# Times as many contacts as in time, fraction of the rods near the wall, and contacts, from which a wall is late. Of
+# simulated walls in time, .55 to .85 of the rods near them touch, of those that are late as well; with wrong radii or a
+# wrong camera at most .45 touch at any time.
+MORE, MOST, FEWEST = 2.0, 0.5, 20
+ALIKE = 0.2  # [photographs] by which the lags of two halves of the photographs, or of several walls, may differ
+
+
+class Touches(NamedTuple):
+    """Rods at a wall of every photograph, for all LAGS."""
+
+    touching: Array  # (f, l) rods that touch it
+    near: Array  # (f, l) rods near it
+    gap: Array  # (f, l) sum of the gaps [m] of touching rods from the wall as it is given
+
+    def fraction(self, number: int) -> float:
+        """Fraction of the near rods that touch the wall at a lag."""
+        return float(self.touching[:, number].sum() / max(self.near[:, number].sum(), 1.0))
+
+
+class _Late(NamedTuple):
+    """A wall that is not in time."""
+
+    lag: float  # [photographs] by which it is late
+    name: str
+    touching: int  # rods that touch it at that time, in all photographs
+    given: int  # … and as it is given
+    apart: bool  # whether these rods seem apart from it, not beyond it
+
+
+def examine_wall_times(tracks: Tracks, walls: WallTracks) -> list[Finding]:
+    """Look for straight walls that more rods touch if they are late or early by a part of a photograph.
+
+    Notes
+    -----
+    Between two photographs the wall moves on a straight path. Counted are rods whose gap is within three standard
+    deviations of zero, for every lag; even and odd photographs must show the same lag by themselves. Wrong radii move
+    the rods from all walls, or beyond all: some wall must be in time, or rods apart from one and beyond another.
+    """
+    late, in_time = [], False
+    for w in np.flatnonzero(walls.sides == STRAIGHT).tolist():
+        found = count_touches(tracks, walls, w)
+        in_time |= found.fraction(IN_TIME) > MOST
+        lag, count = find_lag(found), found.touching.sum(axis=0)
+        if lag:
+            apart = bool(found.gap[:, int(np.argmax(count))].sum() > 0.0)
+            late.append(_Late(lag, walls.name[w], int(count.max()), int(count[IN_TIME]), apart))
+    if not (in_time or len({each.apart for each in late}) == 2):
+        return []
+    late.sort()
+    groups = np.split(np.arange(len(late)), np.flatnonzero(np.diff([each.lag for each in late]) > ALIKE) + 1)
+    words = [_describe([late[each] for each in group]) for group in groups if len(group)]
+    return [finding("walls_shifted", "; ".join(words))] if words else []
+
+
+def count_touches(tracks: Tracks, walls: WallTracks, w: int) -> Touches:
+    """Count the rods at wall w."""
+    frames, radius = tracks.frame_count, float(tracks.radius.mean())
+    width = max(SIGMAS * float(np.nanmedian(tracks.position_sigma)), ROUGH * radius)
+    found = Touches(*np.zeros((3, frames, len(LAGS))))
+    for k in range(frames):
+        here = np.flatnonzero(tracks.present_in(k))
+        here = here[beside_wall(walls.endpoints[k, w], None, tracks.position[k, here], np.zeros(len(here)))]
+        own = distance_from_walls(walls.endpoints[k, w], None, tracks.position[k, here]) - tracks.radius[here]
+        here, own = here[np.abs(own) < NEAR * radius], own[np.abs(own) < NEAR * radius]
+        for number, lag in enumerate(LAGS):
+            if 0.0 <= k + lag <= frames - 1:
+                ends = _at(walls.endpoints[:, w], k + lag)
+                gap = distance_from_walls(ends, None, tracks.position[k, here]) - tracks.radius[here]
+                touches = np.abs(gap) < width
+                found.touching[k, number], found.near[k, number] = touches.sum(), len(here)
+                found.gap[k, number] = own[touches].sum()
+    return found
+
+
+def find_lag(found: Touches) -> float:
+    """The lag of a wall [photographs]; 0: in time, or not known."""
+    count = found.touching.sum(axis=0)
+    best = int(np.argmax(count))
+    enough = count[best] >= max(MORE * count[IN_TIME], FEWEST) and found.fraction(best) > MOST
+    if not enough or abs(LAGS[best]) < LEAST_LAG:
+        return 0.0
+    halves = [float(LAGS[int(np.argmax(found.touching[start::2].sum(axis=0)))]) for start in (0, 1)]
+    return float(LAGS[best]) if abs(halves[0] - halves[1]) <= ALIKE else 0.0
+
+
+def _describe(walls: list[_Late]) -> str:
+    """Describe walls that are late, or early, by the same time."""
+    lag = float(np.mean([each.lag for each in walls]))
+    names = ", ".join(f"'{each.name}'" for each in walls)
+    subject, verb, them, they = (
+        ("wall", "is", "it", "it is") if len(walls) == 1 else ("walls", "are", "them", "they are")
+    )
+    touching, given = sum(each.touching for each in walls), sum(each.given for each in walls)
+    return (
+        f"{subject} {names} {verb} {'late' if lag > 0.0 else 'early'} by {abs(lag):.1f} of the time between "
+        f"photographs: {touching} rods touch {them} then, {given} as {they} given"
+    )
+
+
+def _at(endpoints: Array, time: float) -> Array:
+    """Ends (2, 2) of a wall (f, 2, 2) at a time [photographs]."""
+    before = min(int(np.floor(time)), len(endpoints) - 2)
+    part = time - before
+    return (1.0 - part) * endpoints[before] + part * endpoints[before + 1]

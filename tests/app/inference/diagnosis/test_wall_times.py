@@ -1,0 +1,67 @@
+"""Walls that are late or early, by the rods that touch them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rodsight.inference.diagnosis.wall_times import examine_wall_times
+
+from .test_direct_tests import FRAMES, NOISE, RADIUS, SIDE, N, box, rolling_tracks
+
+RISE = 1e-3  # [m] of the packing and its box from photograph to photograph
+
+
+@pytest.fixture(scope="module")
+def rising():
+    """Rods of a packing that rises in its box; the tracks, and the box in time."""
+    tracks, walls = rolling_tracks(), box()
+    rise = RISE * np.arange(FRAMES)
+    position, endpoints = tracks.position.copy(), walls.endpoints.copy()
+    position[..., 1] += rise[:, None]
+    endpoints[..., 1] += rise[:, None, None]
+    return replace(tracks, position=position), replace(walls, endpoints=endpoints)
+
+
+def delayed(walls, lag, chosen=(0, 1)):
+    """Chosen walls late by a lag [photographs]; those before the first photograph rest."""
+    endpoints = walls.endpoints.copy()
+    for wall in chosen:
+        endpoints[:, wall, :, 1] -= np.minimum(lag, np.arange(FRAMES))[:, None] * RISE
+    return replace(walls, endpoints=endpoints)
+
+
+def test_walls_in_time_give_no_finding(rising):
+    assert examine_wall_times(*rising) == []
+
+
+@pytest.mark.parametrize(("lag", "words"), [(1.0, "late by 1.0"), (0.5, "late by 0.5"), (-0.5, "early by 0.5")])
+def test_late_and_early_walls_are_named_with_the_rods_that_touch_them(rising, lag, words):
+    tracks, walls = rising
+    (found,) = examine_wall_times(tracks, delayed(walls, lag))
+    assert found.cause == "walls_shifted"
+    assert f"walls 'bottom', 'top' are {words}" in found.evidence
+    assert "rods touch them then" in found.evidence
+
+
+def test_one_late_wall_is_named_alone(rising):
+    tracks, walls = rising
+    (found,) = examine_wall_times(tracks, delayed(walls, 0.5, [1]))
+    assert found.evidence.startswith("wall 'top' is late by 0.5")
+
+
+def test_wrong_radii_and_places_are_no_lag(rising):
+    tracks, walls = rising
+    small = replace(tracks, radius=np.full(N, RADIUS - 0.5 * RISE))
+    assert examine_wall_times(small, walls) == []  # apart from both walls
+    far = replace(walls, endpoints=walls.endpoints - 2.0 * RISE)
+    assert examine_wall_times(tracks, far) == []  # no time helps
+    rng = np.random.default_rng(3)
+    rough = np.where(np.arange(N) < N - SIDE, RADIUS, RADIUS + rng.normal(0.0, 6.0 * NOISE, N))  # those at the top
+    rough = replace(tracks, radius=rough)
+    assert examine_wall_times(rough, delayed(walls, 0.5, [1])) == []  # too few touch at any time
+
+
+def test_walls_at_rest_are_in_time():
+    assert examine_wall_times(rolling_tracks(), box()) == []
