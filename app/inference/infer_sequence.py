@@ -16,6 +16,8 @@ from ..process.machine.linear_algebra import one_thread_each
 from ..results.hdf5.lazy_sequences import LazySequence
 from ..results.results import Results
 from ..solver.assessment.fringe_pressures import FringePressures, compare_with_fringes
+from ..solver.assessment.intervals.force_intervals import widen_scale
+from ..solver.assessment.intervals.scale_sd import FIRST_BY_SECOND
 from ..solver.assessment.intervals.statistic_intervals import widen_for_friction
 from ..solver.assessment.penalties import limit_for_few_photographs, penalise_friction
 from ..solver.convex.friction_check import FrictionCheck
@@ -132,7 +134,7 @@ def _with_first_frame(
         fringed = sequence.tracks.fringes is not None  # they determine the scale of every frame by themselves
         if sequence.settings.soft and not sequence.packing.scale_is_known and not fringed:
             forces = _on_scale_of(frames[0], forces)
-        forces = _limit_by_second(with_remarks(sequence, forces), frames)
+        forces = _widen_by_second(_limit_by_second(with_remarks(sequence, forces), frames), frames)
         summary = summarise_frame(sequence, forces)
     except MemoryError:  # no fault of the frame
         raise
@@ -161,6 +163,12 @@ def _limit_by_second(forces: FrameForces, frames: Sequence[FrameForces]) -> Fram
         forces, trust=second.trust, expected_correlation=min(forces.expected_correlation, second.expected_correlation),
         trust_penalties="; ".join(filter(None, (words, forces.trust_penalties))),
     )  # fmt: skip
+
+
+def _widen_by_second(forces: FrameForces, frames: Sequence[FrameForces]) -> FrameForces:
+    """Add the uncertain scale of the second frame to that of the first."""
+    uncertain = FIRST_BY_SECOND * frames[1].scale_sd if len(frames) > 1 else np.nan
+    return widen_scale(forces, uncertain) if np.isfinite([uncertain, forces.scale_sd]).all() else forces
 
 
 def _widen_statistics(

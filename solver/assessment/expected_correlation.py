@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..bodies.grains import Array
 from .evidence import Evidence
 from .fitted import FITTED
 
@@ -37,8 +38,11 @@ MEASURES: dict[str, Callable[[Evidence], float]] = {
     # two readings of the positions: the posterior, and the balance of overlaps
     "disagreement_of_positions": lambda e: 1.0 - e.position_agreement,
 }
-# Where nothing slides, these are small for want of motion, which is no evidence for the forces.
-BY_SLIDING = frozenset({"disagreement_of_members", "force_change", "power_gap"})
+# Where nothing slides, these are small for want of motion, which is no evidence for the forces: estimates that know the
+# balance of forces alone agree, too.
+BY_SLIDING = frozenset({
+    "disagreement_of_estimates", "disagreement_with_either", "disagreement_of_members", "force_change", "power_gap",
+})  # fmt: skip
 MOSTLY_OVERLAPS = 0.5  # weight of the position-only estimate of soft grains above which only its evidence counts
 CONTRADICTED: float = FITTED["expected_correlation"]["contradicted"]  # change of a prediction where a cause is named
 WIDEST: float = FITTED["expected_correlation"]["widest_gap_error"]  # gap error that simulated frames have reached
@@ -170,10 +174,14 @@ def _as_far_as_seen(name: str, value: float, seen: float) -> float:
     return seen * value if name in BY_SLIDING and value > 0.0 else value
 
 
+def seen_sliding(hidden: Array | np.float64) -> Array:
+    """Sliding over its noise, at most 1, of values (f,) of the measure "hidden_sliding"."""
+    return np.minimum(1.0 / hidden - LEAST_SIGNAL, 1.0)
+
+
 def _seen_sliding(evidence: Evidence) -> float:
-    """Sliding over its noise, at most 1; 1 where that is not known."""
-    signal = evidence.information.slide_signal
-    return 1.0 if math.isnan(signal) else min(signal, 1.0)
+    hidden = MEASURES["hidden_sliding"](evidence)
+    return 1.0 if math.isnan(hidden) else float(seen_sliding(np.float64(hidden)))
 
 
 def _logarithm(table: dict[str, Any], measure: float) -> float:

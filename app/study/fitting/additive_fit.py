@@ -17,17 +17,17 @@ BEST_R, WORST_R = 0.995, -0.2  # limits of r whose arctanh is fitted
 
 @dataclass(frozen=True, slots=True)
 class AdditiveFit:
-    """arctanh r = max(constant + Σ value(measure), least)."""
+    """arctanh r = max(constant + Σ value(measure), least); a measure's strength multiplies what it adds above zero."""
 
     constant: float
     least: float  # score of the frame of the fit with the worst evidence: beyond it nothing is known
     terms: dict[str, tuple[Array, Array]]  # knots of ln measure and values
 
-    def score(self, measures: Mapping[str, Array]) -> Array:
-        """arctanh of the expected correlation (f,), of logarithms of measures (f,); NaN: not known."""
+    def score(self, measures: Mapping[str, Array], strength: Mapping[str, Array]) -> Array:
+        """arctanh of the expected correlation (f,), of logarithms of measures (f,), NaN: not known, and strengths."""
         total = np.full(len(next(iter(measures.values()))), self.constant)
         for name, (at, value) in self.terms.items():
-            total += _evaluate(measures[name], at, value)
+            total += _weaken(_evaluate(measures[name], at, value), strength.get(name))
         return np.maximum(total, self.least)
 
     def describe(self) -> list[str]:
@@ -44,32 +44,40 @@ def correlation_target(r: Array) -> Array:
     return np.arctanh(np.clip(r, WORST_R, BEST_R))
 
 
-def fit_additive(measures: Mapping[str, Array], names: Sequence[str], target: Array, weight: Array) -> AdditiveFit:
+def fit_additive(
+    measures: Mapping[str, Array], strength: Mapping[str, Array], names: Sequence[str], target: Array, weight: Array
+) -> AdditiveFit:
     """Fit a target by backfitting of isotonic regressions, each averaged to knots.
 
     Parameters
     ----------
     measures : mapping of str to ndarray, shape (f,)
         Logarithms of the measures; NaN: not known.
+    strength : mapping of str to ndarray, shape (f,)
+        Of those measures that do not always speak for r: factors in [0, 1] of what they add above zero.
     names : sequence of str
         Those that are used.
     target, weight : ndarray, shape (f,)
     """
     constant = float(np.average(target, weights=weight))
-    parts = {name: np.zeros(len(target)) for name in names}
+    nothing = np.zeros(len(target))
+    parts = dict.fromkeys(names, nothing)
     terms: dict[str, tuple[Array, Array]] = {}
     for _ in range(ROUNDS):
         for name in names:
-            rest = target - constant - sum((parts[other] for other in names if other != name), np.zeros(len(target)))
-            terms[name] = _regress(measures[name], rest, weight)
-            parts[name] = _evaluate(measures[name], *terms[name])
-    unlimited = AdditiveFit(constant, -np.inf, terms).score(measures)
+            rest = target - constant - sum((parts[other] for other in names if other != name), nothing)
+            # parts above zero are those of the round before: the regression then stays linear
+            factor = np.where(parts[name] > 0.0, strength.get(name, 1.0), 1.0)
+            terms[name] = _regress(measures[name], rest, weight, factor)
+            parts[name] = _weaken(_evaluate(measures[name], *terms[name]), strength.get(name))
+    unlimited = AdditiveFit(constant, -np.inf, terms).score(measures, strength)
     return AdditiveFit(constant, float(unlimited.min()), terms)
 
 
-def _regress(measure: Array, rest: Array, weight: Array) -> tuple[Array, Array]:
-    known = np.isfinite(measure)
-    x, y, w = measure[known], rest[known], weight[known]
+def _regress(measure: Array, rest: Array, weight: Array, factor: Array) -> tuple[Array, Array]:
+    """Knots and values of the h that minimises Σ w (rest − factor h(measure))², isotonic and smoothed."""
+    known = np.isfinite(measure) & (factor > 0.0)
+    x, y, w = measure[known], (rest / np.where(known, factor, 1.0))[known], (weight * factor**2)[known]
     order = np.argsort(x, kind="stable")
     x, w = x[order], w[order]
     fitted = isotonic_regression(y[order], weights=w, increasing=False).x
@@ -78,6 +86,10 @@ def _regress(measure: Array, rest: Array, weight: Array) -> tuple[Array, Array]:
     value = np.array([np.average(fitted[near], weights=w[near]) for near in (np.abs(x - c) <= reach for c in at)])
     value = np.minimum.accumulate(value)
     return at, value - np.average(np.interp(x, at, value), weights=w)
+
+
+def _weaken(value: Array, strength: Array | None) -> Array:
+    return value if strength is None else np.where(value > 0.0, strength * value, value)
 
 
 def _evaluate(measure: Array, at: Array, value: Array) -> Array:

@@ -17,6 +17,7 @@ SMALL = 1e-4  # factors below it do not matter
 LEAST_ERROR = 1e-4  # of a scale: its logarithm is taken
 STARTS, STEPS = 6, 3000  # of the minimisation
 FOLDS = 6
+STEP, MOST = 0.5, 6.0  # of the factor of first frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +73,23 @@ def fit_scale(sample: ScaleSample, least: float, start: Array) -> Array:
         enough = sample.coverage(scale_sd_of(sample.terms, middle * factors, least))[1] >= AIMED
         low, high = (low, middle) if enough else (middle, high)
     return np.where(high * factors < SMALL, 0.0, high * factors)
+
+
+def fit_first(sample: ScaleSample) -> float:
+    """Factor of the second term of first frames, whose first term has a factor of one: the least multiple of STEP.
+
+    Parameters
+    ----------
+    sample : ScaleSample
+        First frames. Terms: the standard deviation by their own evidence, and that of the second frame's scale.
+
+    Notes
+    -----
+    So that two standard deviations cover COVERED of them.
+    """
+    factors = np.arange(0.0, MOST + STEP, STEP)
+    covered = [sample.coverage(scale_sd_of(sample.terms, np.array([1.0, each]), 0.0))[1] for each in factors]
+    return float(factors[int(np.argmax(np.array(covered) >= COVERED))]) if max(covered) >= COVERED else MOST
 
 
 def describe_scale(sample: ScaleSample, used: Mapping[str, float], least: float) -> list[str]:

@@ -60,6 +60,7 @@ class ScenarioScore:
     measures: tuple[tuple[float | None, ...], ...] = ()  # (f, m) of the evidence, see `expected_correlation.MEASURES`
     scales: tuple[float | None, ...] = ()  # (f,) Σ f_n / Σ f_n,true; empty without a scale of forces
     scale_terms: tuple[tuple[float | None, ...], ...] = ()  # (f, t) of its standard deviation, see `scale_sd.TERMS`
+    scale_sd: tuple[float | None, ...] = ()  # (f,) as stated
     status: tuple[str, ...] = ()  # (f,)
     overlaps: tuple[bool, ...] = ()  # (f,) whether the forces follow from the overlaps of soft grains
     coverage: tuple[float | None, float | None] = (None, None)  # of f_n by one and by two standard deviations
@@ -210,6 +211,7 @@ def _compare(
         scales=tuple(_plain(each.scale) for each in agreement) if sized else (),
         trust=tuple(_plain(frame.trust) for frame in frames),
         expected=tuple(_plain(frame.expected_correlation) for frame in frames),
+        scale_sd=tuple(_plain(frame.scale_sd) for frame in frames),
         status=tuple(FrameStatus(frame.status).name.lower() for frame in frames),
         coverage=_coverage(frames[SETTLED:], true[SETTLED:], agreement[SETTLED:], sized=sized),
         r_ours=_mean(baselines["r_ours"][SETTLED:]),

@@ -16,23 +16,23 @@ from rich.console import Console
 from rich.table import Table
 from scipy.stats import spearmanr
 
-from ...solver.assessment.expected_correlation import LEAST, MEASURES
+from ...solver.assessment.expected_correlation import BY_SLIDING, LEAST, MEASURES, seen_sliding
+from ...solver.assessment.intervals.scale_sd import FIRST_BY_SECOND, TABLE, TERMS
 from ...solver.assessment.intervals.scale_sd import LEAST as LEAST_SCALE_SD
-from ...solver.assessment.intervals.scale_sd import TABLE, TERMS
 from ...solver.bodies.grains import Array
 from ...synthetic.scenarios.preset_names import Group
 from ...synthetic.scenarios.scenario_table import SCENARIOS, Scenario
 from ..fitting.additive_fit import AdditiveFit, correlation_target, fit_additive
 from ..fitting.bound_fit import BoundFit, JudgedFrames, fit_bound
-from ..fitting.scale_fit import ScaleSample, describe_scale, scale_sd_of
+from ..fitting.scale_fit import ScaleSample, describe_scale, fit_first, scale_sd_of
 from .scenario_score import TRUST_TOLERANCE, ScenarioScore
 
 GROUPS: tuple[Group, ...] = ("correct", "missing physics", "wrong input")
 # Kinds that no fit reads: of each group some, and of each mechanism at most one.
 LEFT_OUT = frozenset({
     "step_1", "circle", "corners", "radii_03", "strong_cohesion", "rolling", "stiff_moving", "theta_sign", "aspect_03",
-    "walls_late", "swapped_frames", "shuffled", "outliers", "one_jump", "missing_poses", "tilted_bed", "stiff_loose",
-    "rough_walls", "rising_corners", "shear_box", "footing", "intruder", "drum", "stiffest",
+    "walls_late", "left_late", "swapped_frames", "shuffled", "outliers", "one_jump", "missing_poses", "tilted_bed",
+    "stiff_loose", "rough_walls", "rising_corners", "shear_box", "footing", "intruder", "drum", "stiffest",
 })  # fmt: skip
 TOO_HIGH, TOO_LOW = TRUST_TOLERANCE, 0.15  # T above r, T below r
 # Excess of T over r, and fraction of the frames of any group that may have more while their kind is left out: what T
@@ -139,6 +139,13 @@ class TrustSample:
         names, index, count = np.unique(self.kind, return_inverse=True, return_counts=True)
         return 1.0 / (count[index] * len(names))
 
+    @property
+    def strength(self) -> dict[str, Array]:
+        """Factors (f,) of what measures of little motion add: the fraction of the sliding that is seen."""
+        hidden = self.measures["hidden_sliding"]
+        seen = np.where(np.isfinite(hidden), seen_sliding(np.exp(np.nan_to_num(hidden))), 1.0)
+        return dict.fromkeys(BY_SLIDING, seen)
+
     def fold(self) -> NDArray[np.int64]:
         """Number of the group of kinds that is left out with a frame (f,)."""
         names, index = np.unique(self.kind, return_inverse=True)
@@ -189,9 +196,24 @@ def scale_sample(scores: Sequence[ScenarioScore]) -> ScaleSample:
     return ScaleSample(np.array([kind for kind, *_ in rows]), terms, np.abs([1.0 / scale - 1.0 for *_, scale in rows]))
 
 
+def first_scales(scores: Sequence[ScenarioScore]) -> ScaleSample:
+    """First frames with a known scale: their own standard deviation and that of the second frame, as `fit_first`."""
+    rows = [
+        (score.scenario, score.scale_sd[0], score.scale_sd[1], score.scales[0])
+        for score in scores
+        if len(score.scales) > 1 and None not in (*score.scale_sd[:2], score.scales[0]) and score.scales[0] != 0.0
+    ]
+    stated, second, scale = np.array([each for _, *each in rows], float).reshape(len(rows), 3).T
+    own = np.sqrt(np.maximum(stated**2 - (FIRST_BY_SECOND * second) ** 2, 0.0))
+    return ScaleSample(
+        np.array([kind for kind, *_ in rows]), np.stack([own, second], axis=1), np.abs(1.0 / scale - 1.0)
+    )
+
+
 def describe_scale_fit(scores: Sequence[ScenarioScore]) -> str:
     """Fit the standard deviation of the scale, and describe it as the table of fitted.toml."""
-    return "\n".join(describe_scale(scale_sample(scores), {name: TABLE[name] for name in TERMS}, LEAST_SCALE_SD))
+    lines = describe_scale(scale_sample(scores), {name: TABLE[name] for name in TERMS}, LEAST_SCALE_SD)
+    return "\n".join([*lines, f"first_by_second = {fit_first(first_scales(scores)):g}"])
 
 
 def print_scale(console: Console, scores: Sequence[ScenarioScore]) -> None:
@@ -208,21 +230,28 @@ def print_scale(console: Console, scores: Sequence[ScenarioScore]) -> None:
         f"{100.0 * float(sample.weight @ sd):.1f} %; beyond two in more than a tenth of the frames of "
         + (", ".join(poor) or "no kind"), highlight=False, soft_wrap=True,
     )  # fmt: skip
+    first = first_scales(scores)
+    sd = scale_sd_of(first.terms, np.array([1.0, FIRST_BY_SECOND]), 0.0)
+    one, two = first.coverage(sd)
+    console.print(
+        f"of {len(sd)} first photographs {100.0 * one:.0f} and {100.0 * two:.0f} %; mean standard deviation "
+        f"{100.0 * float(first.weight @ sd):.1f} %", highlight=False, soft_wrap=True,
+    )  # fmt: skip
 
 
 def _fit_leaving_out(sample: TrustSample, names: Sequence[str]) -> tuple[AdditiveFit, Array]:
     """Fit all, and scores (f,) by fits without the seed and the kind; where these leave nothing, by the fit of all."""
     target, fold = correlation_target(sample.r), sample.fold()
-    whole = fit_additive(sample.measures, names, target, sample.weight)
-    score = whole.score(sample.measures)
+    whole = fit_additive(sample.measures, sample.strength, names, target, sample.weight)
+    score = whole.score(sample.measures, sample.strength)
     for seed in np.unique(sample.seed):
         for each in range(FOLDS):
             away = (sample.seed == seed) & (fold == each)
             known = (sample.seed != seed) & ((fold != each) | (fold.max() == 0))
             if away.any() and known.any():
-                some = sample.select(known)
-                found = fit_additive(some.measures, names, target[known], some.weight)
-                score[away] = found.score(sample.select(away).measures)
+                some, others = sample.select(known), sample.select(away)
+                found = fit_additive(some.measures, some.strength, names, target[known], some.weight)
+                score[away] = found.score(others.measures, others.strength)
     return whole, score
 
 
@@ -238,8 +267,8 @@ def refit(sample: TrustSample, fits: dict[str, TrustFit]) -> TrustSample:
         here = sample.overlaps if name == "overlaps" else ~sample.overlaps
         if name == "motion" or not here.any():
             continue
-        measures = sample.select(here).measures
-        score = fit.expected.score(measures)
+        some = sample.select(here)
+        score = fit.expected.score(some.measures, some.strength)
         expected[here], trust[here] = np.maximum(np.tanh(score), 0.0), fit.bound.bound(score)
     return replace(sample, expected=expected, trust=trust)
 

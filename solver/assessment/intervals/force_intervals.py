@@ -187,6 +187,15 @@ def _scale_errors(frame: FrameForces) -> Array:
     return relative * np.abs(np.column_stack([frame.fn, frame.ft]))
 
 
+def widen_scale(frame: FrameForces, sd: float) -> FrameForces:
+    """Add a relative error of all forces to the standard deviation of the scale, and to those of the forces."""
+    wider = replace(frame, scale_sd=math.hypot(frame.scale_sd, sd))
+    variance = _scale_errors(wider) ** 2 - _scale_errors(frame) ** 2
+    stated = np.column_stack([frame.fn_sd, frame.ft_sd])
+    both = np.where(stated > 0.0, np.sqrt(stated**2 + variance), stated)  # zero stays zero
+    return replace(wider, fn_sd=both[:, 0], ft_sd=both[:, 1])
+
+
 def formula_sd_of(frame: FrameForces) -> Array:
     """Invert `calibrate_sd`: its argument over the mean f_n, floor and proportional errors included (c, 2)."""
     stated = np.column_stack([frame.fn_sd, frame.ft_sd])

@@ -12,6 +12,9 @@ from ..fitted import FITTED
 TABLE = FITTED["scale_sd"]
 LEAST: float = TABLE["least"]
 WITHOUT_MOTION: float = FITTED["force_intervals"]["first_scale"]
+# Error of the first scale that is common with the second one, over the standard deviation of the latter: positions
+# alone show nothing of the friction that motion, walls or a base mobilised before.
+FIRST_BY_SECOND: float = TABLE["first_by_second"]
 # Evidence that the scale is uncertain, by the name of its factor in fitted.toml; NaN: not known.
 TERMS: dict[str, Callable[[Evidence], float]] = {
     "per_load": lambda e: abs(math.log(e.load_fraction)) if e.load_fraction > 0.0 else 0.0,

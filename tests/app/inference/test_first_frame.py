@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -10,6 +11,8 @@ import numpy as np
 import pytest
 from rodsight.inference.first_frame import _prior_errors, _without_own_corrections, estimate_first_frame
 from rodsight.inference.snapshots import measure_sequence
+from rodsight.solver.assessment.intervals.force_intervals import FIRST_SCALE
+from rodsight.solver.assessment.intervals.scale_sd import FIRST_BY_SECOND
 from rodsight.solver.calibration.equations import rotate_offsets
 from rodsight.solver.frame_forces import FrameStatus
 
@@ -35,6 +38,13 @@ def test_later_frames_improve_the_first_and_its_reason_states_so(wrong_centres):
     assert after.trust < agreement(after, true) + 0.03
     contacts = wrong_centres.store.frames[0].statistics.contact_count
     assert results.statistics[0].contact_count == pytest.approx(contacts, rel=0.1)
+
+
+@pytest.mark.thorough
+def test_the_scale_of_the_first_is_less_certain_than_that_of_the_second(wrong_centres):
+    first, second = wrong_centres.complete().frames[:2]
+    assert first.scale_sd == pytest.approx(math.hypot(FIRST_SCALE, FIRST_BY_SECOND * second.scale_sd))
+    assert first.scale_sd > max(second.scale_sd, FIRST_SCALE)
 
 
 @pytest.mark.thorough

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rodsight.study.fitting.scale_fit import ScaleSample, describe_scale, fit_scale, scale_sd_of
+from rodsight.study.fitting.scale_fit import MOST, ScaleSample, describe_scale, fit_first, fit_scale, scale_sd_of
 
 LEAST = 0.01
 
@@ -32,6 +32,16 @@ def test_every_kind_counts_the_same():
         one_kind | (np.arange(len(one_kind)) % 10 == 0)
     )
     assert uneven.coverage(np.full(len(uneven.error), 0.1)) == pytest.approx((0.5, 0.5))
+
+
+def test_first_frames_get_the_least_factor_that_covers_them():
+    rng = np.random.default_rng(4)
+    own, second = np.full(4000, 0.15), rng.uniform(0.05, 0.4, 4000)
+    error = np.abs(rng.normal(0.0, np.hypot(own, 1.8 * second)))
+    made = ScaleSample(np.repeat("kind", 4000), np.stack([own, second], axis=1), error)
+    assert fit_first(made) == 2.0
+    assert fit_first(ScaleSample(made.kind, made.terms, 100.0 * error)) == MOST
+    assert fit_first(ScaleSample(made.kind, made.terms, 0.0 * error)) == 0.0
 
 
 @pytest.mark.thorough

@@ -126,12 +126,11 @@ def test_agreement_without_sliding_is_no_evidence():
     def score(signal: float, **changes: float) -> float:
         return correlation_score(replace(BOTH, information=replace(BOTH.information, slide_signal=signal), **changes))
 
-    calm, usual = {"disagreement": 0.05, "force_change": 0.01, "power_gap": 0.01}, {
-        "disagreement": 0.2, "force_change": 0.035, "power_gap": 0.08
+    calm, usual = {"disagreement": 0.05, "force_change": 0.01, "power_gap": 0.01, "agreement": 0.98}, {
+        "disagreement": 0.2, "force_change": 0.035, "power_gap": 0.08, "agreement": 0.9
     }  # fmt: skip
     rise = {signal: score(signal, **calm) - score(signal, **usual) for signal in (0.0, 0.5, 1.0, 9.0)}
-    assert rise[0.0] == pytest.approx(0.055, abs=0.04)  # the difference of the negative parts alone
-    assert rise[0.0] < 0.1 < 0.3 < rise[0.5] < rise[1.0]
+    assert 0.0 <= rise[0.0] < 0.1 < 0.3 < rise[0.5] < rise[1.0]  # at rest, differences of negative parts alone
     assert rise[9.0] == pytest.approx(rise[1.0])
     worse = {"disagreement": 0.5, "force_change": 0.3, "power_gap": 0.5}
     against = {signal: score(signal, **usual) - score(signal, **worse) for signal in (0.0, 9.0)}

@@ -6,7 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.solver.assessment.motion_information import MotionInformation, measure_motion_information, motion_scale
+from rodsight.solver.assessment.motion_information import (
+    FEW,
+    MotionInformation,
+    measure_motion_information,
+    motion_scale,
+)
 from rodsight.solver.bodies.motion import FrameMotion, no_motion
 from rodsight.solver.contacts.contacts import Contacts, detect_contacts
 
@@ -61,15 +66,31 @@ def test_the_signal_is_the_sliding_over_its_noise_less_the_noise(lattice):
     assert np.isnan([none.slide_signal, none.sliding, none.gap_error]).all()
 
 
-def test_a_rod_that_rolls_freely_is_no_signal_of_sliding(lattice):
-    """It bears nothing, and its sliding shows no force; of a packing at rest it would be nearly all of the signal."""
+def spinning(lattice, rods: int):
+    """Motion in which the first rods turn and all others rest, and their contacts (c,)."""
     _, snapshot, _, contacts = lattice
     motion = rolling(snapshot, 0.0)
-    free = int(contacts.i[0])
-    motion.grains.spin[free] = 1e3 * NOISE / RADIUS / INTERVAL
-    touched = (contacts.i == free) | (contacts.j == free)
+    motion.grains.spin[:rods] = 1e3 * NOISE / RADIUS / INTERVAL
+    return motion, (contacts.i < rods) | (contacts.j < rods) & ~contacts.with_wall
+
+
+def test_rods_that_roll_freely_are_no_signal_of_sliding(lattice):
+    """They bear nothing, and their sliding shows no force; of a packing at rest it would be nearly all the signal."""
+    rods = len(lattice[1].present) // 3
+    motion, touched = spinning(lattice, rods)
     assert measure(lattice, motion).slide_signal > 10.0
     assert measure(lattice, motion, fn=np.where(touched, 0.05, 1.0)).slide_signal == 0.0
+
+
+def test_few_contacts_that_slide_are_no_signal_whatever_they_bear(lattice):
+    contacts = lattice[3]
+    motion, touched = spinning(lattice, 1)
+    rest = np.flatnonzero(~touched)
+    few = contacts.select(np.r_[np.flatnonzero(touched)[:1], np.tile(rest, 40 // len(rest) + 1)])
+    assert 0.0 < 1.0 / few.count < FEW
+    assert measure(lattice, motion, few).slide_signal == 0.0
+    half = contacts.select(np.r_[np.flatnonzero(touched), rest[: touched.sum()]])
+    assert measure(lattice, motion, half).slide_signal > 10.0
 
 
 def test_the_error_of_gaps_is_that_of_strong_contacts_without_noise(lattice):
@@ -120,3 +141,16 @@ def test_only_grains_beside_a_wall_can_be_beyond_it(lattice):
     moved = packing, replace(snapshot, position=position), walls, contacts
     assert measure(moved, rolling(snapshot, 0.0)).beyond == 1
     assert measure(lattice, rolling(snapshot, 0.0)).beyond == 0
+
+
+def test_grains_that_lie_beside_the_apparatus_are_no_part_of_the_packing(lattice):
+    packing, snapshot, walls, contacts = lattice
+    position = snapshot.position.copy()
+    position[:2, 0] = walls.endpoints[:, :, 0].max() + 5.0 * RADIUS
+    beside = packing, replace(snapshot, position=position), walls, contacts
+    two = (contacts.i < 2) & (contacts.j < 2) & ~contacts.with_wall
+    assert two.any()
+    inside = (contacts.i > 1) & (contacts.j > 1)
+    for chosen, beyond in ((inside, 0), (inside | two, 0), (np.ones(contacts.count, np.bool_), 2)):
+        pairs = contacts.select(chosen)
+        assert measure(beside, rolling(snapshot, 0.0), pairs).beyond == beyond

@@ -24,6 +24,7 @@ from rodsight.solver.assessment.intervals.force_intervals import (
     terms_of,
     usual_trust,
     widen_for_friction,
+    widen_scale,
 )
 
 from tests.app.recording.fake_results import make_results
@@ -153,6 +154,19 @@ def test_the_scale_of_the_first_frame_counts_once(frame):
     )
     assert same.fn_sd == pytest.approx(first.fn_sd)
     assert twice.fn_sd**2 - first.fn_sd**2 == pytest.approx((2.0 * FIRST_SCALE * frame.fn) ** 2)
+
+
+def test_a_further_error_of_the_scale_widens_the_intervals_as_if_it_had_been_known(frame):
+    first = replace(frame, frame=0, scale_sd=FIRST_SCALE)
+    later = widen_scale(calibrate_sd(first), 2.0 * FIRST_SCALE)
+    before = calibrate_sd(replace(first, scale_sd=5.0**0.5 * FIRST_SCALE))
+    assert later.scale_sd == pytest.approx(before.scale_sd)
+    assert later.fn_sd == pytest.approx(before.fn_sd)
+    assert later.ft_sd == pytest.approx(before.ft_sd)
+    certain = replace(first, fn_sd=np.zeros(len(first.fn)))
+    assert not widen_scale(certain, 1.0).fn_sd.any()
+    soft = replace(calibrate_sd(first), soft=True)
+    assert widen_scale(soft, 1.0).fn_sd == pytest.approx(soft.fn_sd)  # fitted with their scale
 
 
 def test_intervals_of_the_first_frame_widen_with_its_friction(frame):
