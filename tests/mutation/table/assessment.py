@@ -13,6 +13,19 @@ OUTLIERS = "tests/app/inference/test_outliers.py"
 
 MUTANTS = [
     *mutants_of(
+        "solver/assessment/motion_information.py",
+        f"{TESTS}/test_motion_information.py",
+        ("MOST_BY_FEW * _sliding_over_noise(slid[most], slide_sd[most])", "math.inf"),
+        ("MOST_BY_LOOSE * _sliding_over_noise(slid[held], slide_sd[held])", "math.inf"),
+        ("return int((beyond & np.isin(part, part[snapshot.present & ~beyond])).sum())", "return int(beyond.sum())"),
+    ),
+    *mutants_of(
+        "solver/assessment/intervals/force_intervals.py",
+        FORCE_INTERVALS,
+        ("_scale_errors(wider) ** 2 - _scale_errors(frame) ** 2", "_scale_errors(wider) ** 2"),
+        ("np.where(stated > 0.0, np.sqrt(stated**2 + variance), stated)", "np.sqrt(stated**2 + variance)"),
+    ),
+    *mutants_of(
         "solver/assessment/fitted.toml",
         STATUS,
         ("single_chain_correction = [0.95, 0.8]", "single_chain_correction = [0.5, 0.8]"),

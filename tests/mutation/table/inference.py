@@ -20,6 +20,32 @@ MUTANTS = [
         ("np.cos(2.0 * between)", "np.cos(3.0 * between)"),
     ),
     *mutants_of(
+        "app/inference/diagnosis/wall_times.py",
+        f"{TESTS}/diagnosis/test_wall_times.py",
+        ("in_time |= found.fraction(IN_TIME) > MOST", "in_time = True"),
+        ("and found.fraction(best) > MOST", ""),
+        ("ends = _at(walls.endpoints[:, w], k + lag)", "ends = _at(walls.endpoints[:, w], k - lag)"),
+        ("return (1.0 - part) * endpoints[before] + part * endpoints[before + 1]", "return endpoints[before]"),
+        ("if abs(halves[0] - halves[1]) <= ALIKE else 0.0", "if False else 0.0"),
+    ),
+    *mutants_of(
+        "app/study/fitting/additive_fit.py",
+        "tests/app/study/test_trust_fit.py",
+        ("np.where(value > 0.0, strength * value, value)", "value"),
+        ("np.where(parts[name] > 0.0, strength.get(name, 1.0), 1.0)", "np.ones(len(target))"),
+        ("increasing=False", "increasing=True"),
+    ),
+    *mutants_of(
+        "app/study/fitting/bound_fit.py",
+        "tests/app/study/test_trust_fit.py",
+        ("    return _shifted(fit, high)", "    return fit"),
+    ),
+    *mutants_of(
+        "app/study/fitting/scale_fit.py",
+        "tests/app/study/test_scale_fit.py",
+        ("np.argmax(np.array(covered) >= COVERED)", "np.argmin(np.array(covered) >= COVERED)"),
+    ),
+    *mutants_of(
         "app/inference/backward_pass.py",
         f"{TESTS}/test_backward_pass.py",
         ("information * variance[:, :1] + second[:, :1]", "variance[:, :1] + second[:, :1]"),

@@ -157,8 +157,8 @@ def test_the_scale_of_the_first_frame_counts_once(frame):
 
 
 def test_a_further_error_of_the_scale_widens_the_intervals_as_if_it_had_been_known(frame):
-    first = replace(frame, frame=0, scale_sd=FIRST_SCALE)
-    later = widen_scale(calibrate_sd(first), 2.0 * FIRST_SCALE)
+    first = replace(frame, frame=0, scale_sd=2.0 * FIRST_SCALE)
+    later = widen_scale(calibrate_sd(first), FIRST_SCALE)
     before = calibrate_sd(replace(first, scale_sd=5.0**0.5 * FIRST_SCALE))
     assert later.scale_sd == pytest.approx(before.scale_sd)
     assert later.fn_sd == pytest.approx(before.fn_sd)
