@@ -82,11 +82,7 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
         )
     friction = summary["friction"]
     if friction is not None and friction["enclosed"]:
-        verdict = "agrees with" if friction["agrees"] else "[bold red]contradicts[/]"
-        measured, low, high = (_cell(friction[key], ".2f") for key in ("measured", "low", "high"))
-        lines.append(
-            f"Friction from the motion: {measured} ({low} to {high}), which {verdict} the given {friction['given']:g}."
-        )
+        lines.append(friction_line(friction, [each["cause"] for each in summary.get("diagnosis", [])]))
     if summary.get("base_friction"):
         lines.append(f"Friction of the base that was used: {summary['base_friction']:.3g}.")
     if friction is not None and friction["walls"][0] is not None:
@@ -115,6 +111,18 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
                 f"r(f_t) {np.mean(late_t):.3f}.[/]"
             )
     return lines
+
+
+def friction_line(friction: dict[str, Any], causes: list[str]) -> str:
+    """State the friction that fits the motion; it is that of the rods unless other causes of wrong forces are named."""
+    measured, low, high = (_cell(friction[key], ".2f") for key in ("measured", "low", "high"))
+    if friction["agrees"]:
+        verdict = f"which agrees with the given {friction['given']:g}"
+    elif causes and "friction" not in causes:
+        verdict = "which is not that of the rods: something else is wrong"
+    else:
+        verdict = f"which [bold red]contradicts[/] the given {friction['given']:g}"
+    return f"Friction from the motion: {measured} ({low} to {high}), {verdict}."
 
 
 # Statistics with a reported standard deviation: name, label, factor, unit, format.
