@@ -218,7 +218,7 @@ SCHEMA: tuple[Entity, ...] = (
     ),
     Entity(entities.STATUS_LANE, "status of the frame", _LANE, When.START),
     Entity(entities.TRACKING_LANE, "whether every grain has a pose", _LANE, When.START),
-    _scalar(entities.TRUST, "T, lower bound of the correlation with the true forces, given these inputs"),
+    _scalar(entities.TRUST, "T, lower bound of the correlation with the true forces, from the evidence of the frame"),
     _scalar(
         entities.ERROR_BUDGET, "fraction of each cause in the variance of the force error", When.END, Condition.BUDGET,
     ),

@@ -137,8 +137,8 @@ def _trust(frames: list[FrameSummary]) -> str:
     return (
         "## How far to trust it\n\n| | |\n|---|---|\n"
         + "\n".join(f"| {name} | {value} |" for name, value in rows)
-        + "\n\nT is a lower bound of the correlation with the true forces *given these inputs*: it does not include a "
-        "wrong friction coefficient, wrong radii or a missed contact. Read forces of frames that are not *settled* "
+        + "\n\nT is a lower bound of the correlation with the true forces, from the evidence of the frame itself: "
+        "errors of the input that leave no trace in it are not included. Read forces of frames that are not *settled* "
         "with care."
     )
 
