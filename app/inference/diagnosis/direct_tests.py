@@ -12,7 +12,7 @@ from ...results.finding import Finding
 from ...solver.bodies.grains import Array, Grains
 from ...solver.bodies.rods import RodMaterial
 from ...solver.bodies.strain import displacement_gradient, inertial_time, shear_strain
-from ...solver.bodies.wall_shapes import STRAIGHT, beside_wall, distance_from_walls
+from ...solver.bodies.wall_shapes import STRAIGHT
 from ...solver.contacts.contacts import detect_contacts
 from ...solver.inferred.unknown_rotations import fill_unknown_rotations
 from ...solver.statistics.agreement import pearson, ranks
@@ -20,6 +20,7 @@ from ...tracks import Tracks, WallTracks
 from ..correction.outliers import find_outliers, walls_in
 from ..correction.radii import find_wrong_sizes
 from .causes import finding
+from .wall_times import rods_beside
 
 AGREES = 0.15  # rank correlation of stated and inferred rotations beyond which they are the same, or opposite …
 SIGMAS = 5.0  # … and standard deviations of that of unrelated ones
@@ -327,10 +328,5 @@ def _known_gaps(tracks: Tracks, walls: WallTracks, w: int, order: int) -> Iterat
 
 def _near_gap(tracks: Tracks, walls: WallTracks, k: int, w: int, *, nearest: int = NEAREST) -> float:
     """Gap [m] between a wall and one of the nearest rods beside it."""
-    here = np.flatnonzero(tracks.present_in(k))
-    ends = walls.endpoints[k, w]
-    here = here[beside_wall(ends, None, tracks.position[k, here], np.zeros(len(here)))]
-    if len(here) < nearest:
-        return np.nan
-    gap = distance_from_walls(ends, None, tracks.position[k, here]) - tracks.radius[here]
-    return float(np.sort(gap)[nearest - 1])
+    _, gap = rods_beside(tracks, k, walls.endpoints[k, w])
+    return float(np.sort(gap)[nearest - 1]) if len(gap) >= nearest else np.nan

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...results.finding import Finding
 from ...solver.bodies.grains import Array
@@ -60,10 +61,10 @@ def examine_wall_times(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     for w in np.flatnonzero(walls.sides == STRAIGHT).tolist():
         found = count_touches(tracks, walls, w)
         in_time |= found.fraction(IN_TIME) > MOST
-        lag, count = find_lag(found), found.touching.sum(axis=0)
-        if lag:
-            apart = bool(found.gap[:, int(np.argmax(count))].sum() > 0.0)
-            late.append(_Late(lag, walls.name[w], int(count.max()), int(count[IN_TIME]), apart))
+        number = find_lag(found)
+        if number != IN_TIME:
+            count, apart = found.touching.sum(axis=0), bool(found.gap[:, number].sum() > 0.0)
+            late.append(_Late(float(LAGS[number]), walls.name[w], int(count[number]), int(count[IN_TIME]), apart))
     if not (in_time or len({each.apart for each in late}) == 2):
         return []
     late.sort()
@@ -78,29 +79,34 @@ def count_touches(tracks: Tracks, walls: WallTracks, w: int) -> Touches:
     width = max(SIGMAS * float(np.nanmedian(tracks.position_sigma)), ROUGH * radius)
     found = Touches(*np.zeros((3, frames, len(LAGS))))
     for k in range(frames):
-        here = np.flatnonzero(tracks.present_in(k))
-        here = here[beside_wall(walls.endpoints[k, w], None, tracks.position[k, here], np.zeros(len(here)))]
-        own = distance_from_walls(walls.endpoints[k, w], None, tracks.position[k, here]) - tracks.radius[here]
-        here, own = here[np.abs(own) < NEAR * radius], own[np.abs(own) < NEAR * radius]
-        for number, lag in enumerate(LAGS):
-            if 0.0 <= k + lag <= frames - 1:
-                ends = _at(walls.endpoints[:, w], k + lag)
-                gap = distance_from_walls(ends, None, tracks.position[k, here]) - tracks.radius[here]
-                touches = np.abs(gap) < width
-                found.touching[k, number], found.near[k, number] = touches.sum(), len(here)
-                found.gap[k, number] = own[touches].sum()
+        here, own = rods_beside(tracks, k, walls.endpoints[k, w])
+        near = np.abs(own) < NEAR * radius
+        here, own = here[near], own[near]
+        known = (k + LAGS >= 0.0) & (k + LAGS <= frames - 1)
+        ends = _at(walls.endpoints[:, w], k + LAGS[known])
+        gap = distance_from_walls(ends[:, None], None, tracks.position[k, here]) - tracks.radius[here]
+        touches = np.abs(gap) < width
+        found.touching[k, known], found.near[k, known] = touches.sum(axis=1), len(here)
+        found.gap[k, known] = touches @ own
     return found
 
 
-def find_lag(found: Touches) -> float:
-    """The lag of a wall [photographs]; 0: in time, or not known."""
+def rods_beside(tracks: Tracks, k: int, ends: Array) -> tuple[NDArray[np.intp], Array]:
+    """Rods (m,) of photograph k that project onto a straight wall (2, 2), and their gaps from it (m,) [m]."""
+    here = np.flatnonzero(tracks.present_in(k))
+    here = here[beside_wall(ends, None, tracks.position[k, here], np.zeros(len(here)))]
+    return here, distance_from_walls(ends, None, tracks.position[k, here]) - tracks.radius[here]
+
+
+def find_lag(found: Touches) -> int:
+    """Number of the lag of a wall among LAGS; IN_TIME also where it is not known."""
     count = found.touching.sum(axis=0)
     best = int(np.argmax(count))
     enough = count[best] >= max(MORE * count[IN_TIME], FEWEST) and found.fraction(best) > MOST
     if not enough or abs(LAGS[best]) < LEAST_LAG:
-        return 0.0
+        return IN_TIME
     halves = [float(LAGS[int(np.argmax(found.touching[start::2].sum(axis=0)))]) for start in (0, 1)]
-    return float(LAGS[best]) if abs(halves[0] - halves[1]) <= ALIKE else 0.0
+    return best if abs(halves[0] - halves[1]) <= ALIKE else IN_TIME
 
 
 def _describe(walls: list[_Late]) -> str:
@@ -117,8 +123,8 @@ def _describe(walls: list[_Late]) -> str:
     )
 
 
-def _at(endpoints: Array, time: float) -> Array:
-    """Ends (2, 2) of a wall (f, 2, 2) at a time [photographs]."""
-    before = min(int(np.floor(time)), len(endpoints) - 2)
-    part = time - before
+def _at(endpoints: Array, time: Array) -> Array:
+    """Ends (t, 2, 2) of a wall (f, 2, 2) at times (t,) [photographs]."""
+    before = np.minimum(np.floor(time).astype(np.intp), len(endpoints) - 2)
+    part = (time - before)[:, None, None]
     return (1.0 - part) * endpoints[before] + part * endpoints[before + 1]

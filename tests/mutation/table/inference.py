@@ -24,9 +24,9 @@ MUTANTS = [
         f"{TESTS}/diagnosis/test_wall_times.py",
         ("in_time |= found.fraction(IN_TIME) > MOST", "in_time = True"),
         ("and found.fraction(best) > MOST", ""),
-        ("ends = _at(walls.endpoints[:, w], k + lag)", "ends = _at(walls.endpoints[:, w], k - lag)"),
+        ("ends = _at(walls.endpoints[:, w], k + LAGS[known])", "ends = _at(walls.endpoints[:, w], k - LAGS[known])"),
         ("return (1.0 - part) * endpoints[before] + part * endpoints[before + 1]", "return endpoints[before]"),
-        ("if abs(halves[0] - halves[1]) <= ALIKE else 0.0", "if False else 0.0"),
+        ("if abs(halves[0] - halves[1]) <= ALIKE else IN_TIME", "if False else IN_TIME"),
     ),
     *mutants_of(
         "app/study/fitting/additive_fit.py",
