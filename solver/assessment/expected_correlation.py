@@ -171,7 +171,12 @@ def _term(name: str, table: dict[str, Any], evidence: Evidence) -> float:
 
 def _as_far_as_seen(name: str, value: float, seen: float) -> float:
     """What a measure adds, where a fraction of the sliding is seen."""
-    return seen * value if name in BY_SLIDING and value > 0.0 else value
+    return float(weaken(value, seen)) if name in BY_SLIDING else value
+
+
+def weaken(value: Array | float, strength: Array | float) -> Array:
+    """Multiply values (f,) above zero, which speak for the forces, by strengths in [0, 1]; others count wholly."""
+    return np.where(np.greater(value, 0.0), strength * value, value)
 
 
 def seen_sliding(hidden: Array | np.float64) -> Array:

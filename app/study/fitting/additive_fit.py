@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import isotonic_regression
 
+from ...solver.assessment.expected_correlation import weaken
 from ...solver.bodies.grains import Array
 
 KNOTS, ROUNDS = 9, 12
@@ -27,7 +28,7 @@ class AdditiveFit:
         """arctanh of the expected correlation (f,), of logarithms of measures (f,), NaN: not known, and strengths."""
         total = np.full(len(next(iter(measures.values()))), self.constant)
         for name, (at, value) in self.terms.items():
-            total += _weaken(_evaluate(measures[name], at, value), strength.get(name))
+            total += weaken(_evaluate(measures[name], at, value), strength.get(name, 1.0))
         return np.maximum(total, self.least)
 
     def describe(self) -> list[str]:
@@ -69,7 +70,7 @@ def fit_additive(
             # parts above zero are those of the round before: the regression then stays linear
             factor = np.where(parts[name] > 0.0, strength.get(name, 1.0), 1.0)
             terms[name] = _regress(measures[name], rest, weight, factor)
-            parts[name] = _weaken(_evaluate(measures[name], *terms[name]), strength.get(name))
+            parts[name] = weaken(_evaluate(measures[name], *terms[name]), strength.get(name, 1.0))
     unlimited = AdditiveFit(constant, -np.inf, terms).score(measures, strength)
     return AdditiveFit(constant, float(unlimited.min()), terms)
 
@@ -86,10 +87,6 @@ def _regress(measure: Array, rest: Array, weight: Array, factor: Array) -> tuple
     value = np.array([np.average(fitted[near], weights=w[near]) for near in (np.abs(x - c) <= reach for c in at)])
     value = np.minimum.accumulate(value)
     return at, value - np.average(np.interp(x, at, value), weights=w)
-
-
-def _weaken(value: Array, strength: Array | None) -> Array:
-    return value if strength is None else np.where(value > 0.0, strength * value, value)
 
 
 def _evaluate(measure: Array, at: Array, value: Array) -> Array:

@@ -132,7 +132,7 @@ def load_isotropically(cell: ShearCell, loading: LoadingPath) -> Iterator[DemFra
     for k in range(loading.frames):
         rise = 1.0 - abs(k - peak) / peak if peak else 0.0
         pressure = loading.settings.pressure * (1.0 + (GREATEST_PRESSURE - 1.0) * rise)
-        cell.load(top=pressure * cell.width * length, side=pressure * cell.height * length)
+        _press(cell, pressure, pressure, length)
         yield cell.photograph(cell.rest())
 
 
@@ -141,7 +141,7 @@ def step_loads(cell: ShearCell, loading: LoadingPath) -> Iterator[DemFrame]:
     length, pressure = loading.settings.length, loading.settings.pressure
     for k in range(loading.frames):
         side = pressure * (LATE_FACTOR if k > loading.frames // 2 else 1.0)
-        cell.load(top=LOAD_RISE**k * pressure * cell.width * length, side=side * cell.height * length)
+        _press(cell, LOAD_RISE**k * pressure, side, length)
         yield cell.photograph(cell.rest())
 
 
@@ -151,9 +151,14 @@ def shear_under_loads(cell: ShearCell, loading: LoadingPath) -> Iterator[DemFram
     for k in range(loading.frames):
         variation = LOAD_AMPLITUDE * np.sin(2.0 * np.pi * k / LOAD_PERIOD)
         top, side = pressure * (1.0 + variation), pressure * (1.0 - 0.5 * variation)
-        cell.load(top=top * cell.width * length, side=side * cell.height * length)
+        _press(cell, top, side, length)
         cell.shear_to(float(np.deg2rad(loading.initial_shear + loading.step * k)))
         yield cell.photograph(cell.rest())
+
+
+def _press(cell: ShearCell, top: float, side: float, length: float) -> None:
+    """Load plate and right side of the cell by pressures [Pa] on the parts that the packing of rods fills."""
+    cell.load(top=top * cell.width * length, side=side * cell.height * length)
 
 
 def push_core(cell: RingCell, loading: LoadingPath) -> Iterator[DemFrame]:

@@ -68,6 +68,14 @@ def fused_multiply_add(builder, a, b, c):
     return builder.call(multiply_add, (a, b, c))
 
 
+def evaluate_polynomial(builder, coefficients: list, t):
+    """Evaluate Σ c[d] t^d by Horner's rule, of vectors c[d]."""
+    result = coefficients[-1]
+    for each in reversed(coefficients[:-1]):
+        result = fused_multiply_add(builder, result, t, each)
+    return result
+
+
 def sum_lanes(builder, vector):
     """Sum all lanes, halves onto halves."""
     while vector.type.count > 1:

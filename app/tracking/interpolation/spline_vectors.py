@@ -18,6 +18,7 @@ from .lanes import (
     SINGLE_BYTES,
     broadcast,
     broadcast_lane,
+    evaluate_polynomial,
     fused_multiply_add,
     load,
     sum_lanes,
@@ -67,12 +68,9 @@ def _spline_reader(degree: int, lanes: int):
 
 
 def _weights(builder, coefficients, t):
-    """Evaluate Σ c[d] t^d in every lane by Horner's rule; coefficients (d, lanes)."""
+    """Evaluate Σ c[d] t^d in every lane; coefficients (d, lanes)."""
     constants = [ir.Constant(t.type, row.astype("f4").astype("f8").tolist()) for row in coefficients]
-    result = constants[-1]
-    for each in reversed(constants[:-1]):
-        result = fused_multiply_add(builder, result, t, each)
-    return result
+    return evaluate_polynomial(builder, constants, t)
 
 
 # (coefficients, ix, iy, tx, ty): the spline at (ix + tx, iy + ty), 0 ≤ t < 1, as in `spline_values`.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...solver.bodies.grains import Array
-from .lanes import constant, fused_multiply_add
+from .lanes import constant, evaluate_polynomial, fused_multiply_add
 
 
 def weight_polynomials(degree: int, first: int, lanes: int) -> Array:
@@ -32,15 +32,8 @@ def build_weights(builder, degree: int, t) -> list:
         power = np.zeros(degree + 1)
         for k, coefficient in enumerate(column):
             power[: k + 1] += coefficient * (shifted**k).coef
-        even, odd = (_polynomial(builder, power[begin::2], square) for begin in (0, 1))
+        powers = [constant(t.type, each) for each in power]
+        even, odd = (evaluate_polynomial(builder, powers[begin::2], square) for begin in (0, 1))
         first.append(fused_multiply_add(builder, odd, s, even))
         last.append(fused_multiply_add(builder, builder.fneg(odd), s, even))
     return first + last[::-1]
-
-
-def _polynomial(builder, coefficients: Array, t):
-    """Evaluate Σ c[d] t^d by Horner's rule."""
-    result = constant(t.type, coefficients[-1])
-    for each in coefficients[-2::-1]:
-        result = fused_multiply_add(builder, result, t, constant(t.type, each))
-    return result

@@ -31,7 +31,6 @@ MUTANTS = [
     *mutants_of(
         "app/study/fitting/additive_fit.py",
         "tests/app/study/test_trust_fit.py",
-        ("np.where(value > 0.0, strength * value, value)", "value"),
         ("np.where(parts[name] > 0.0, strength.get(name, 1.0), 1.0)", "np.ones(len(target))"),
         ("increasing=False", "increasing=True"),
     ),
