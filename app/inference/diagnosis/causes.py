@@ -67,7 +67,7 @@ CAUSES: dict[str, Cause] = {
         "correct the ends of the wall",
     ),
     "walls_shifted": Cause(
-        "rods seem to penetrate walls or to leave them", "give the walls at the times of the photographs"
+        "rods seem to penetrate walls or to leave them", "give the places of the walls at the times of the photographs"
     ),
     "wall_at_rest": Cause(
         "rods seem to penetrate the wall or to leave it", "give the motion of the wall in every photograph"

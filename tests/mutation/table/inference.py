@@ -27,6 +27,10 @@ MUTANTS = [
         ("ends = _at(walls.endpoints[:, w], k + LAGS[known])", "ends = _at(walls.endpoints[:, w], k - LAGS[known])"),
         ("return (1.0 - part) * endpoints[before] + part * endpoints[before + 1]", "return endpoints[before]"),
         ("if abs(halves[0] - halves[1]) <= ALIKE else IN_TIME", "if False else IN_TIME"),
+        ("    late.sort()\n", ""),
+        ("np.diff([each.lag for each in late]) > ALIKE", "np.diff([each.lag for each in late]) > 9.0"),
+        ("if touch - moved <= SIGMAS * np.sqrt(touch):", "if False:"),
+        ("if touch - moved <= SIGMAS * np.sqrt(touch):", "if True:"),
     ),
     *mutants_of(
         "app/study/fitting/additive_fit.py",

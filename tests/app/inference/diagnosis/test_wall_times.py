@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rodsight.inference.diagnosis.wall_times import examine_wall_times
+from rodsight.tracks import WallTracks
 
 from .test_direct_tests import FRAMES, NOISE, RADIUS, SIDE, N, box, rolling_tracks
 
@@ -16,8 +17,12 @@ RISE = 1e-3  # [m] of the packing and its box from photograph to photograph
 @pytest.fixture(scope="module")
 def rising():
     """Rods of a packing that rises in its box; the tracks, and the box in time."""
+    return raised(RISE * np.arange(FRAMES))
+
+
+def raised(rise):
+    """Rods and their box, both raised from photograph to photograph."""
     tracks, walls = rolling_tracks(), box()
-    rise = RISE * np.arange(FRAMES)
     position, endpoints = tracks.position.copy(), walls.endpoints.copy()
     position[..., 1] += rise[:, None]
     endpoints[..., 1] += rise[:, None, None]
@@ -49,6 +54,39 @@ def test_one_late_wall_is_named_alone(rising):
     tracks, walls = rising
     (found,) = examine_wall_times(tracks, delayed(walls, 0.5, [1]))
     assert found.evidence.startswith("wall 'top' is late by 0.5")
+
+
+def test_late_walls_are_grouped_by_their_time_whatever_their_order(rising):
+    tracks, walls = rising
+    bottom, top = walls.endpoints[:, 0], walls.endpoints[:, 1]
+    middle = bottom.mean(axis=1, keepdims=True)
+    halves = [np.concatenate([bottom[:, :1], middle], axis=1), np.concatenate([middle, bottom[:, 1:]], axis=1)]
+    endpoints = np.stack([halves[0], top, halves[1]], axis=1)
+    three = WallTracks(("left half", "top", "right half"), endpoints, np.full(3, np.nan))
+    (found,) = examine_wall_times(tracks, delayed(delayed(three, 0.5, [0, 2]), 1.0, [1]))
+    first, second = found.evidence.split("; ")
+    assert first.startswith("walls 'left half', 'right half' are late by 0.5")
+    assert second.startswith("wall 'top' is late by 1.0")
+
+
+def test_a_wall_in_steady_motion_is_late_or_misplaced(rising):
+    tracks, walls = rising
+    endpoints = walls.endpoints.copy()
+    endpoints[:, 1, :, 1] -= 0.5 * RISE
+    for wrong in (replace(walls, endpoints=endpoints), delayed(walls, 0.5, [1])):
+        (found,) = examine_wall_times(tracks, wrong)
+        assert "late by 0.5 of the time between photographs, or misplaced by up to 0.5 mm" in found.evidence
+
+
+def test_an_unsteady_motion_distinguishes_a_late_wall_from_a_misplaced_one():
+    step = RISE * np.where(np.arange(FRAMES) % 4 < 2, 0.5, 1.5)
+    rise = np.cumsum(step) - step[0]
+    tracks, walls = raised(rise)
+    endpoints = walls.endpoints.copy()
+    endpoints[:, 1, :, 1] -= (rise - np.interp(np.arange(FRAMES) - 1.0, np.arange(FRAMES), rise))[:, None]
+    (found,) = examine_wall_times(tracks, replace(walls, endpoints=endpoints))
+    assert "late by 1.0" in found.evidence
+    assert "misplaced" not in found.evidence
 
 
 def test_wrong_radii_and_places_are_no_lag(rising):
