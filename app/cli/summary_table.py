@@ -32,6 +32,13 @@ def print_summary(console: Console, summary: dict[str, Any]) -> None:
         console.print(line, highlight=False)
 
 
+def inferred_line(count: int) -> str:
+    """State how many rods no photograph shows."""
+    if count == 1:
+        return "1 rod that is in no photograph was inferred from its neighbours."
+    return f"{count} rods that are in no photograph were inferred from their neighbours."
+
+
 def trust_lines(summary: dict[str, Any]) -> list[str]:
     """Describe accuracy, events and corrections in sentences."""
     count = summary["status_count"]
@@ -95,7 +102,7 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
         lines += calibration_lines(summary["corrections"])
     lines += [f"Boundary: {each}." for each in summary.get("boundary") or []]
     if summary.get("inferred_grains"):
-        lines += [f"{summary['inferred_grains']} rods that are in no photograph were inferred from their neighbours."]
+        lines.append(inferred_line(summary["inferred_grains"]))
     if summary["radius_change"] is not None:
         lines.append(_curve_line(summary["radius_curve"]))
         lines.append(

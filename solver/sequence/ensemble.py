@@ -53,6 +53,7 @@ class EnsembleState:
     steady: ForceMemory  # convex, sliding common to (k − 1, k) and (k, k + 1)
     pairs: PairProbability
     agreeing: int = 0  # consecutive frames in which H was below its level
+    moved: bool = False  # whether chains have advanced through an interval since they started without forces
 
     @property
     def start_forgotten(self) -> bool:
@@ -68,12 +69,15 @@ class EnsembleState:
         """The same network with all members continued from these forces (c, 2) [N]."""
         memory = self.last.renew(contacts, force, present)
         return EnsembleState(
-            memory, memory, self.other, memory, memory, memory, memory, memory, self.pairs, self.agreeing
+            memory, memory, self.other, memory, memory, memory, memory, memory, self.pairs, self.agreeing, self.moved
         )
 
 
 AGREEING_FRAMES = 3  # with H below its level: it only falls until the forces are reset
 CHAINS = 2  # of the MEMBERS, the first
+# Free grains up to which the sweeps of the settings carry a load through a packing that had no forces. A load spreads
+# from row to row like heat: the sweeps that it takes grow with the square of the rows, the number of grains.
+REACHED_GRAINS = 1200
 
 Task = Callable[[], Any]  # one member: a ChainStep, or forces with their memory
 
@@ -167,7 +171,10 @@ def solve_ensemble(
     return EnsembleForces(
         chains.soft, fn, ft, touching.detected, members.force[:, :, 0], members.force[:, :, 1],
         np.array(members.weight), np.array(members.place),
-        EnsembleState(soft, stiff, chains.other, last, ahead, around, wide, steady, touching.pairs, chains.agreeing),
+        EnsembleState(
+            soft, stiff, chains.other, last, ahead, around, wide, steady, touching.pairs, chains.agreeing,
+            state.moved or problem.motion.ends_here,
+        ),
         chains.start_difference, "; ".join([*members.remarks, *remark]), touching.forbidden,
         touching.forbidden_probability, missing.only(touching.contacts.key), members.seen_slip, members.power_gap,
         balance,
@@ -242,6 +249,9 @@ def _chain_starts(problem: FrameProblem, state: EnsembleState, touching: Touchin
     """The two chains, and the first once more from another start unless the start is forgotten."""
     packing, motion, contacts = problem.packing, problem.motion, touching.contacts
     chain = problem.settings.chain
+    if not state.moved:
+        reached = max(int((problem.snapshot.present & packing.grains.free).sum()) / REACHED_GRAINS, 1.0)
+        chain = replace(chain, sweeps=round(reached * chain.sweeps))
     network = ProbabilityNetwork(state.pairs if motion.ends_here else touching.pairs, touching.pairs)
     assert chain.kappa is not None
     unrecorded = replace(chain, keep="none")

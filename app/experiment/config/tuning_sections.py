@@ -179,7 +179,8 @@ class SolverSection(Section):
         "Steps of the chain where there are no previous forces.", default=CHAIN.spin_up
     )
     sweeps: Annotated[int, whole(1, 1_000_000)] = key(
-        "Gauss-Seidel sweeps of a sub-step. They regularise: more sweeps make the forces of a sequence less exact.",
+        "Gauss-Seidel sweeps of a sub-step. They regularise: more sweeps make the forces of a sequence less exact. "
+        "Where an ensemble of more than 1200 grains has no previous forces, they grow with the number of grains.",
         default=CHAIN.sweeps,
     )
     relaxation: Annotated[float, Field(strict=True, gt=0, lt=2)] = key(

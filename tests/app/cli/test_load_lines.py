@@ -1,9 +1,9 @@
-"""The load on a wall is stated in newtons, with the part of it that rods of the boundary bear."""
+"""Lines of the summary: loads in newtons, with the part that rods of the boundary bear, and rods that were inferred."""
 
 from __future__ import annotations
 
 import pytest
-from rodsight.cli.summary_table import load_line
+from rodsight.cli.summary_table import inferred_line, load_line
 
 PRESSED = {"wall": "top", "width": 0.25, "length": 0.06, "pressure": 5e4, "force": 750.0, "fraction_on_free_rods": 1.0}
 MEASURED = PRESSED | {"pressure": None, "range": [740.0, 760.0]}
@@ -16,3 +16,8 @@ def test_the_part_on_boundary_rods_is_stated_where_there_is_one(load) -> None:
     assert "Rods of the boundary bear 9 % of it" in load_line(load | {"fraction_on_free_rods": 0.91})
     earlier = {key: value for key, value in load.items() if key != "fraction_on_free_rods"}
     assert load_line(earlier) == load_line(load)
+
+
+def test_one_inferred_rod_is_stated_in_the_singular() -> None:
+    assert inferred_line(1) == "1 rod that is in no photograph was inferred from its neighbours."
+    assert inferred_line(2).startswith("2 rods that are")

@@ -31,6 +31,8 @@ MUTANTS = [
         FRAMES,
         ("stiffer: float = 2.0", "stiffer: float = 4.0"),
         ("motion.ends_here and not state.start_forgotten", "motion.ends_here"),
+        ("sweeps=round(reached * chain.sweeps)", "sweeps=chain.sweeps"),
+        ("state.moved or problem.motion.ends_here,", "True,"),
         ("np.average(members.force, axis=0, weights=members.weight)", "np.average(members.force, axis=0)"),
         (
             "np.where(are_among(contacts.key, verdicts.forced), 1.0, probability_detected)",

@@ -141,6 +141,16 @@ def test_every_sweep_is_counted_and_the_last_recorded_one_has_the_forces_of_the_
     assert history.fn[-1] == pytest.approx(frame.nlgs_fn.astype(np.float32))
 
 
+def test_chains_without_forces_sweep_in_proportion_to_the_grains_until_they_have_advanced(monkeypatch):
+    packing, snapshots = sheared_frames(5)
+    settings = replace(ENSEMBLE, reset_frames=frozenset({3}))
+    usual = [frame.sweeps for frame, _ in run(packing, snapshots, settings)]
+    assert usual == [200, 200, 200, 400, 200]
+    monkeypatch.setattr(ensemble, "REACHED_GRAINS", packing.grains.count / 3)
+    found = [frame.sweeps for frame, _ in run(packing, snapshots, settings)]
+    assert found == [600, 600, 200, 1200, 200]
+
+
 def test_recorded_sweeps_are_log_spaced_and_end_with_the_last():
     kept = recorded_sweeps(5000, "log")
     assert kept[:8].tolist() == list(range(8))
