@@ -19,6 +19,7 @@ from ..bodies.grains import Array, GrainMotion, Grains
 from ..bodies.packing import Material
 from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts
+from .sweeping.grain_records import RECORD
 from .sweeping.ordering import GROUP, VisitingOrder, order_contacts
 
 PLATE_IMPEDANCE = 30.0  # of a loaded plate, in mean grain impedances
@@ -35,7 +36,7 @@ class ContactProblem(NamedTuple):
 
     body: Float[Array, "n 4"]  # free velocity vx, vy, ω R [m/s] and 1/Z [m/(N s)]
     plate: Float[Array, "w 2"]  # free normal velocity beyond the measured one [m/s] and 1/Z, 0 where motion is imposed
-    pair_body: Int32[np.ndarray, "blocks 2 L"]  # grains i, j
+    pair_body: Int32[np.ndarray, "blocks 2 L"]  # grains i, j: the places of their records in body, read flat
     # nx, ny, 1/W_nn, offset of u_n [m/s] (closing velocity and motion of the cell between both grains); offset of u_t
     # with a cell
     pair: Float[Array, "blocks rows L"]
@@ -157,7 +158,7 @@ def assemble(
     return ContactProblem(
         body,
         plate,
-        _blocks(np.stack([i[rows_pair], j[rows_pair]], axis=1)),
+        _blocks(np.stack([i[rows_pair], j[rows_pair]], axis=1) * np.int32(RECORD)),
         _blocks(np.column_stack(pair)),
         grouped,
         wall_body,
@@ -175,7 +176,7 @@ def with_impedance(
     body, plate, weight = _free_motion(grains, motion, walls, material, impedance)
     compliance, pair, wall = body[:, 3], aligned_zeros(problem.pair.shape), problem.wall.copy()
     pair[:] = problem.pair
-    first, second = problem.pair_body[:, 0], problem.pair_body[:, 1]
+    first, second = problem.pair_body[:, 0] // RECORD, problem.pair_body[:, 1] // RECORD
     # Zero are rows of padding, and of two bodies with imposed motion.
     pair[:, 2] = np.where(pair[:, 2] > 0.0, _inverse(compliance[first] + compliance[second]), 0.0)
     wall[:, 2], wall[:, 3] = _effective_impedances(body, plate, problem.wall_body, wall[:, 6], wall[:, 7])

@@ -26,12 +26,17 @@ def sources() -> list[Path]:
 
 
 def public_functions(tree: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
-    """Functions, methods and constructors that are public, without compiled kernels, which take plain arrays."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            compiled = any("njit" in ast.unparse(each) for each in node.decorator_list)
-            if not compiled and (node.name == "__init__" or not node.name.startswith("_")):
-                yield node
+    """Functions, methods and constructors that are public, without compiled kernels, which take plain arrays.
+
+    The plain form of vector instructions counts as compiled, too.
+    """
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
+    decorators = {ast.unparse(each) for node in functions for each in node.decorator_list}
+    for node in functions:
+        compiled = any("njit" in ast.unparse(each) for each in node.decorator_list)
+        compiled |= f"llvm_implementation_of({node.name})" in decorators
+        if not compiled and (node.name == "__init__" or not node.name.startswith("_")):
+            yield node
 
 
 def parameters_of(function: ast.FunctionDef | ast.AsyncFunctionDef) -> list[str]:
@@ -56,6 +61,8 @@ def test_public_functions_have_few_parameters():
         ("def f(a, /, b, *c, d, **e): pass", 3),
         ("class C:\n def __init__(self, a): pass", 1),
         ("@njit(cache=True)\ndef f(a): pass", 0),
+        ("def f(a): pass\n@llvm_implementation_of(f)\ndef _g(b): pass", 0),
+        ("def f(a): pass\n@llvm_implementation_of(h)\ndef _g(b): pass", 1),
         ("def _f(a): pass", 0),
     ],
 )

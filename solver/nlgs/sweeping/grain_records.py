@@ -20,84 +20,55 @@ _LOW, _HIGH = [0, 1, 8, 9, 4, 5, 12, 13], [2, 3, 10, 11, 6, 7, 14, 15]
 def gather_records(body, ids, first, rows, at, stride):  # type: ignore[no-untyped-def]
     """Copy the records of the grains ids[first : first + WIDTH] to rows[at + q * stride], q the quantity.
 
-    body (4 n,), ids int32, rows: flat arrays, contiguous.
+    body (4 n,), ids int32, rows: flat arrays, contiguous; an id is the place of a record in body.
     """
     for k in range(WIDTH):
         for q in range(RECORD):
-            rows[at + q * stride + k] = body[RECORD * ids[first + k] + q]
-
-
-def gather_differences(body, ids, first, second, rows, at, stride):  # type: ignore[no-untyped-def]
-    """Copy to rows[at + q * stride] the differences ids[second :] − ids[first :] of vx and vy, and the sums of ω R."""
-    for k in range(WIDTH):
-        for q in range(RECORD - 1):
-            a, b = body[RECORD * ids[first + k] + q], body[RECORD * ids[second + k] + q]
-            rows[at + q * stride + k] = b + a if q == 2 else b - a
-
-
-def transpose_records(body, first, rows, at, stride):  # type: ignore[no-untyped-def]
-    """Copy WIDTH adjacent records from body[first] on to rows[at + q * stride]."""
-    for k in range(WIDTH):
-        for q in range(RECORD):
-            rows[at + q * stride + k] = body[first + RECORD * k + q]
+            rows[at + q * stride + k] = body[ids[first + k] + q]
 
 
 def scatter_records(rows, at, stride, body, ids, first):  # type: ignore[no-untyped-def]
     """Copy rows[at + q * stride] to the records of the distinct grains ids[first : first + WIDTH]."""
     for k in range(WIDTH):
         for q in range(RECORD):
-            body[RECORD * ids[first + k] + q] = rows[at + q * stride + k]
+            body[ids[first + k] + q] = rows[at + q * stride + k]
 
 
 @llvm_implementation_of(gather_records)
 def _gather(builder, kinds, values):  # type: ignore[no-untyped-def]
     body, ids, first, rows, at, stride = values
-    records = [load(builder, place, RECORD) for place in _records(builder, body, ids, first)]
-    halves = range(RECORD)  # a vector of eight holds grains k and k + 4
-    pairs = [shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in halves]
-    for row, place in zip(_transposed(builder, pairs), _rows(builder, rows, at, stride), strict=True):
-        store(builder, row, place)
-
-
-@llvm_implementation_of(gather_differences)
-def _differences(builder, kinds, values):  # type: ignore[no-untyped-def]
-    body, ids, first, second, rows, at, stride = values
-    both = zip(_records(builder, body, ids, first), _records(builder, body, ids, second), strict=True)
-    records = []
-    for one, other in both:
-        a, b = load(builder, one, RECORD), load(builder, other, RECORD)
-        difference, sum_ = builder.fsub(b, a), builder.fadd(b, a)
-        records.append(shuffle(builder, difference, sum_, [0, 1, RECORD + 2, 3]))
-    pairs = [shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in range(RECORD)]
-    for row, place in zip(_transposed(builder, pairs)[: RECORD - 1], _rows(builder, rows, at, stride), strict=False):
-        store(builder, row, place)
-
-
-@llvm_implementation_of(transpose_records)
-def _transpose(builder, kinds, values):  # type: ignore[no-untyped-def]
-    body, first, rows, at, stride = values
-    places = [builder.gep(body, [builder.add(first, INDEX(RECORD * k))]) for k in range(WIDTH)]
-    records = [load(builder, place, RECORD) for place in places]
-    pairs = [shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in range(RECORD)]
-    for row, place in zip(_transposed(builder, pairs), _rows(builder, rows, at, stride), strict=True):
+    records = [load(builder, place, RECORD) for place in places_of(builder, body, ids, first)]
+    for row, place in zip(transpose(builder, records), _rows(builder, rows, at, stride), strict=True):
         store(builder, row, place)
 
 
 @llvm_implementation_of(scatter_records)
 def _scatter(builder, kinds, values):  # type: ignore[no-untyped-def]
     rows, at, stride, body, ids, first = values
-    pairs = _transposed(builder, [load(builder, place, WIDTH) for place in _rows(builder, rows, at, stride)])
+    found = [load(builder, place, WIDTH) for place in _rows(builder, rows, at, stride)]
+    store_records(builder, found, places_of(builder, body, ids, first))
+
+
+def places_of(builder, body, ids, first, records=1):  # type: ignore[no-untyped-def]
+    """Pointers to the first records of the grains ids[first : first + WIDTH], where each has this number of records."""
+    places = [builder.load(builder.gep(ids, [builder.add(first, INDEX(k))])) for k in range(WIDTH)]
+    return [builder.gep(body, [builder.mul(builder.zext(place, INDEX), INDEX(records))]) for place in places]
+
+
+def transpose(builder, records):  # type: ignore[no-untyped-def]
+    """Rows of the four quantities of eight records."""
+    # A vector of eight holds grains k and k + 4.
+    halves = [shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in range(RECORD)]
+    return _transposed(builder, halves)
+
+
+def store_records(builder, rows, places):  # type: ignore[no-untyped-def]
+    """Store the records whose quantities are these rows."""
+    pairs = _transposed(builder, rows)
     records = [shuffle(builder, pair, pair, range(RECORD)) for pair in pairs]
     records += [shuffle(builder, pair, pair, range(RECORD, WIDTH)) for pair in pairs]
-    for record, place in zip(records, _records(builder, body, ids, first), strict=True):
+    for record, place in zip(records, places, strict=True):
         store(builder, record, place)
-
-
-def _records(builder, body, ids, first):  # type: ignore[no-untyped-def]
-    """Pointers to the records of eight grains."""
-    for k in range(WIDTH):
-        grain = builder.load(builder.gep(ids, [builder.add(first, INDEX(k))]))
-        yield builder.gep(body, [builder.mul(builder.zext(grain, INDEX), INDEX(RECORD))])
 
 
 def _rows(builder, rows, at, stride):  # type: ignore[no-untyped-def]

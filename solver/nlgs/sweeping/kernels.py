@@ -16,12 +16,27 @@ from numba import njit
 
 from ...array_copies import copy_matrix
 from .contact_law import relax_contact
-from .grain_records import WIDTH, gather_differences, gather_records, scatter_records
+from .grain_records import WIDTH, gather_records, scatter_records
+from .measured_groups import (
+    BEARING,
+    CELL_ROWS,
+    CHANGE,
+    NORMAL,
+    RESIDUAL,
+    SIZE,
+    SQUARES,
+    SUMS,
+    THIRD,
+    add_force,
+    add_forces,
+    add_residuals,
+    clear_sums,
+    contact_residual,
+)
 from .ordering import GROUP as L
 
-THIRD = 1.0 / 3.0  # W_nn over W_tt between two solid rods
 IDS = 2 * L  # ids of a block
-ROWS, CELL_ROWS = 4, 5  # rows of a pair block; the fifth costs time in every sweep and exists only in a cell
+ROWS = 4  # rows of a pair block outside a cell; the fifth costs time in every sweep and exists only in a cell
 U = np.uint64
 U1, U2, U3, U4 = U(1), U(2), U(3), U(4)
 
@@ -31,20 +46,19 @@ def apply_forces(problem, body, plate, force):  # type: ignore[no-untyped-def]
     """Set body and plate to the velocities under these forces."""
     copy_matrix(problem.body, body)
     copy_matrix(problem.plate, plate)
-    first = len(force) - len(problem.wall)
+    flat, first = body.reshape(body.size), len(force) - len(problem.wall)
     for c in range(first):
         block, lane = c // L, c % L
-        i, j = problem.pair_body[block, 0, lane], problem.pair_body[block, 1, lane]
+        i, j = U(problem.pair_body[block, 0, lane]), U(problem.pair_body[block, 1, lane])
         nx, ny = problem.pair[block, 0, lane], problem.pair[block, 1, lane]
-        ci, cj = body[i, 3], body[j, 3]
+        ci, cj = flat[i + U3], flat[j + U3]
         fx, fy = force[c, 0] * nx - force[c, 1] * ny, force[c, 0] * ny + force[c, 1] * nx
-        body[i, 0] -= ci * fx
-        body[i, 1] -= ci * fy
-        body[i, 2] -= ci * (2.0 * force[c, 1])  # torque −R f_t over ½ Z R², times R
-        body[j, 0] += cj * fx
-        body[j, 1] += cj * fy
-        body[j, 2] -= cj * (2.0 * force[c, 1])
-    flat = body.reshape(body.size)
+        flat[i] -= ci * fx
+        flat[i + U1] -= ci * fy
+        flat[i + U2] -= ci * (2.0 * force[c, 1])  # torque −R f_t over ½ Z R², times R
+        flat[j] += cj * fx
+        flat[j + U1] += cj * fy
+        flat[j + U2] -= cj * (2.0 * force[c, 1])
     for c in range(len(problem.wall)):
         i, w = U4 * U(problem.wall_body[c, 0]), problem.wall_body[c, 1]
         _apply_wall_force(problem.wall, c, flat, plate, i, w, force[first + c, 0], force[first + c, 1])
@@ -78,14 +92,14 @@ def advance(problem, body, plate, force, sweeps, relaxation):  # type: ignore[no
             for block in range(problem.grouped // L):
                 _relax_group(pair, ids, flat, flat_force, work, block, CELL_ROWS, relaxation, mu)
             for c in range(problem.grouped, first):
-                relax_pair(pair, ids, flat, flat_force, c, CELL_ROWS, relaxation, mu)
+                relax_pair(pair, ids, flat, 1, flat_force, c, CELL_ROWS, relaxation, mu)
         else:
             for block in range(problem.grouped // L):
                 _relax_group(pair, ids, flat, flat_force, work, block, ROWS, relaxation, mu)
             for c in range(problem.grouped, first):
-                relax_pair(pair, ids, flat, flat_force, c, ROWS, relaxation, mu)
+                relax_pair(pair, ids, flat, 1, flat_force, c, ROWS, relaxation, mu)
         for c in range(len(problem.wall)):
-            relax_wall(problem.wall, problem.wall_body, flat, plate, flat_force, first + c, c, relaxation, wall_mu)
+            relax_wall(problem.wall, problem.wall_body, flat, 1, plate, flat_force, first + c, c, relaxation, wall_mu)
 
 
 @njit(inline="always")
@@ -129,10 +143,10 @@ def _relax_group(pair, ids, body, force, work, block, rows, relaxation, mu):  # 
 
 
 @njit(inline="always")
-def relax_pair(pair, ids, body, force, c, rows, relaxation, mu):  # type: ignore[no-untyped-def]
+def relax_pair(pair, ids, body, records, force, c, rows, relaxation, mu):  # type: ignore[no-untyped-def]
     k = c % L
     p, e = (c // L) * rows * L + k, (c // L) * IDS + k
-    i, j = U4 * U(ids[e]), U4 * U(ids[e + L])
+    i, j = U(records) * U(ids[e]), U(records) * U(ids[e + L])
     nx, ny, wn, ci, cj = pair[p], pair[p + L], relaxation * pair[p + 2 * L], body[i + U3], body[j + U3]
     dx, dy = body[j] - body[i], body[j + U1] - body[i + U1]
     un = dx * nx + dy * ny + pair[p + 3 * L]
@@ -154,8 +168,8 @@ def relax_pair(pair, ids, body, force, c, rows, relaxation, mu):  # type: ignore
 
 
 @njit(inline="always")
-def relax_wall(wall, wall_body, body, plate, force, row, c, relaxation, mu):  # type: ignore[no-untyped-def]
-    i, w = U4 * U(wall_body[c, 0]), U(wall_body[c, 1])
+def relax_wall(wall, wall_body, body, records, plate, force, row, c, relaxation, mu):  # type: ignore[no-untyped-def]
+    i, w = U(records) * U4 * U(wall_body[c, 0]), U(wall_body[c, 1])
     nx, ny = wall[c, 0], wall[c, 1]
     un = plate[w, 0] * wall[c, 6] - body[i] * nx - body[i + U1] * ny + wall[c, 4]
     ut = plate[w, 0] * wall[c, 7] + body[i] * ny - body[i + U1] * nx - body[i + U2] + wall[c, 5]
@@ -174,8 +188,8 @@ def relative_size(squares, norm):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def wall_residual(wall, wall_body, body, plate, force, row, c, mu):  # type: ignore[no-untyped-def]
-    i, w = U4 * U(wall_body[c, 0]), U(wall_body[c, 1])
+def wall_residual(wall, wall_body, body, records, plate, force, row, c, mu):  # type: ignore[no-untyped-def]
+    i, w = U(records) * U4 * U(wall_body[c, 0]), U(wall_body[c, 1])
     nx, ny = wall[c, 0], wall[c, 1]
     un = plate[w, 0] * wall[c, 6] - (body[i] * nx + body[i + U1] * ny) + wall[c, 4]
     ut = plate[w, 0] * wall[c, 7] + (body[i] * ny - body[i + U1] * nx) - body[i + U2] + wall[c, 5]
@@ -197,31 +211,24 @@ def measure_forces(force, before):  # type: ignore[no-untyped-def]
     The first is the paper's ε_f = max |Δf| / |f| over contacts; a contact that loses its whole force counts as 1.
     """
     f, old, count = force.reshape(force.size), before.reshape(before.size), len(force)
-    work = workspace(5 * L)  # squares, f_n, bearing, and the greatest change as a fraction, per lane
-    work[: 4 * L] = 0.0
-    work[4 * L :] = 1.0
-    for block in range((count + L - 1) // L):
-        first = block * IDS
-        for k in range(min(L, count - block * L)):
-            c = first + 2 * k
-            fn, ft = f[c], f[c + 1]
-            size = fn * fn + ft * ft
-            work[k] += size
-            work[L + k] += fn
-            work[2 * L + k] += 1.0 if fn > 0.0 else 0.0
-            # Fractions are compared without division: a/b > c/d where a d > c b.
-            change = (fn - old[c]) * (fn - old[c]) + (ft - old[c + 1]) * (ft - old[c + 1])
-            size = size if size > 0.0 else change
-            top, bottom = work[3 * L + k], work[4 * L + k]
-            greater = change * bottom > top * size
-            work[3 * L + k] = change if greater else top
-            work[4 * L + k] = size if greater else bottom
+    sums = workspace(SUMS)
+    clear_sums(sums)
+    for block in range(count // WIDTH):
+        add_forces(f, 2 * WIDTH * block, old, 2 * WIDTH * block, sums)
+    for c in range(count // WIDTH * WIDTH, count):
+        add_force(sums, c % WIDTH, f[2 * c], f[2 * c + 1], old[2 * c], old[2 * c + 1])
+    return measures_of(sums)
+
+
+@njit(inline="always")
+def measures_of(sums):  # type: ignore[no-untyped-def]
+    """The results of `measure_forces` from the sums of all forces."""
     squares, total, bearing, greatest = 0.0, 0.0, 0.0, 0.0
-    for k in range(L):
-        squares += work[k]
-        total += work[L + k]
-        bearing += work[2 * L + k]
-        greatest = max(greatest, work[3 * L + k] / work[4 * L + k])
+    for k in range(WIDTH):
+        squares += sums[SQUARES + k]
+        total += sums[NORMAL + k]
+        bearing += sums[BEARING + k]
+        greatest = max(greatest, sums[CHANGE + k] / sums[SIZE + k])
     return np.sqrt(greatest), np.sqrt(squares), total / max(bearing, 1.0)
 
 
@@ -235,46 +242,31 @@ def measure_natural_map(problem, body, plate, force, norm):  # type: ignore[no-u
     pair, ids = problem.pair.reshape(problem.pair.size), problem.pair_body.reshape(problem.pair_body.size)
     flat, f = body.reshape(body.size), force.reshape(force.size)
     first = len(force) - len(problem.wall)
-    work = workspace(4 * L)  # differences of the grains' records, and the sum of squares per lane
-    work[3 * L :] = 0.0
+    sums = workspace(SUMS)
+    clear_sums(sums)
     total = 0.0
     if problem.pair.shape[1] == CELL_ROWS:
         for block in range(problem.grouped // L):
-            _add_group_residuals(pair, ids, flat, f, work, block, CELL_ROWS, mu)
+            add_residuals(pair, CELL_ROWS, ids, flat, f, block, mu, sums)
         for c in range(problem.grouped, first):
-            total += pair_residual(pair, ids, flat, f, c, CELL_ROWS, mu)
+            total += pair_residual(pair, ids, flat, 1, f, c, CELL_ROWS, mu)
     else:
         for block in range(problem.grouped // L):
-            _add_group_residuals(pair, ids, flat, f, work, block, ROWS, mu)
+            add_residuals(pair, ROWS, ids, flat, f, block, mu, sums)
         for c in range(problem.grouped, first):
-            total += pair_residual(pair, ids, flat, f, c, ROWS, mu)
-    for k in range(L):
-        total += work[3 * L + k]
+            total += pair_residual(pair, ids, flat, 1, f, c, ROWS, mu)
+    for k in range(WIDTH):
+        total += sums[RESIDUAL + k]
     wall_total = 0.0
     for c in range(len(problem.wall)):
-        wall_total += wall_residual(problem.wall, problem.wall_body, flat, plate, f, first + c, c, wall_mu)
+        wall_total += wall_residual(problem.wall, problem.wall_body, flat, 1, plate, f, first + c, c, wall_mu)
     return relative_size(total + wall_total, norm)
 
 
 @njit(inline="always")
-def _add_group_residuals(pair, ids, body, force, work, block, rows, mu):  # type: ignore[no-untyped-def]
-    """Add the squared residuals of a group to the lanes."""
-    p, e = block * rows * L, block * IDS
-    for k in range(0, L, WIDTH):
-        gather_differences(body, ids, e + k, e + L + k, work, k, L)
-    for k in range(L):
-        nx, ny, wn, dx, dy = pair[p + k], pair[p + L + k], pair[p + 2 * L + k], work[k], work[L + k]
-        un = dx * nx + dy * ny + pair[p + 3 * L + k]
-        ut = dy * nx - dx * ny - work[2 * L + k]
-        if rows == CELL_ROWS:
-            ut += pair[p + 4 * L + k]
-        work[3 * L + k] += contact_residual(force[e + 2 * k], force[e + 2 * k + 1], un, ut, wn, THIRD * wn, mu)
-
-
-@njit(inline="always")
-def pair_residual(pair, ids, body, force, c, rows, mu):  # type: ignore[no-untyped-def]
+def pair_residual(pair, ids, body, records, force, c, rows, mu):  # type: ignore[no-untyped-def]
     p, e = (c // L) * rows * L + c % L, (c // L) * IDS + c % L
-    i, j = U4 * U(ids[e]), U4 * U(ids[e + L])
+    i, j = U(records) * U(ids[e]), U(records) * U(ids[e + L])
     nx, ny, wn = pair[p], pair[p + L], pair[p + 2 * L]
     dx, dy = body[j] - body[i], body[j + U1] - body[i + U1]
     un = dx * nx + dy * ny + pair[p + 3 * L]
@@ -282,15 +274,6 @@ def pair_residual(pair, ids, body, force, c, rows, mu):  # type: ignore[no-untyp
     if rows == CELL_ROWS:
         ut += pair[p + 4 * L]
     return contact_residual(force[2 * c], force[2 * c + 1], un, ut, wn, THIRD * wn, mu)
-
-
-@njit(inline="always")
-def contact_residual(fn, ft, un, ut, wn, wt, mu):  # type: ignore[no-untyped-def]
-    """Squared residual |f − P(f − D⁻¹ u)|² of one contact, without the subtraction f − f, which would cancel digits."""
-    normal = min(wn * un, fn)
-    limit = mu * (fn - normal)
-    tangential = min(max(wt * ut, ft - limit), ft + limit)
-    return normal * normal + tangential * tangential
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

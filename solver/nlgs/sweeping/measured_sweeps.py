@@ -1,9 +1,8 @@
-"""Sweeps with residuals of every sweep, in little more than twice the time of plain sweeps.
+"""Sweeps with residuals of every sweep, in little more than one and a half times the time of plain sweeps.
 
 The natural map of a sweep is measured while the next sweep reads the same contacts, with the stored velocities at the
-end of the first. Force sums are accumulated as forces change. The forces are bit-identical to those of plain sweeps.
-The relaxation of a group is repeated here from `kernels`: as a function that both inline, it is no longer vectorised
-and either kernel takes twice as long.
+end of the first. Force sums are accumulated as forces change. The forces are bit-identical to those of plain sweeps. A
+single measured sweep is measured after it, with the same bits.
 """
 
 from __future__ import annotations
@@ -12,23 +11,14 @@ import numpy as np
 from numba import njit
 
 from ...array_copies import copy_matrix, copy_vector
-from .contact_law import relax_contact
-from .grain_records import (
-    RECORD,
-    WIDTH,
-    gather_differences,
-    gather_records,
-    scatter_records,
-    transpose_records,
-)
+from .grain_records import RECORD, WIDTH
 from .kernels import (
     CELL_ROWS,
-    IDS,
     ROWS,
-    THIRD,
     advance,
-    contact_residual,
+    measure_forces,
     measure_natural_map,
+    measures_of,
     pair_residual,
     relative_size,
     relax_pair,
@@ -36,19 +26,18 @@ from .kernels import (
     wall_residual,
     workspace,
 )
-from .ordering import GROUP as L
-
-# Offsets in the workspace: records of the grains, their differences before the sweep, and sums per lane.
-DIFFERENCES, RESIDUAL, SQUARES, NORMAL, BEARING, CHANGE, SIZE, WORKSPACE = (
-    8 * L,
-    11 * L,
-    12 * L,
-    13 * L,
-    14 * L,
-    15 * L,
-    16 * L,
-    17 * L,
+from .measured_groups import (
+    RESIDUAL,
+    SUMS,
+    UNBALANCE,
+    add_force,
+    add_unbalance,
+    add_unbalance_of,
+    clear_sums,
+    finish_grains,
+    relax_and_measure,
 )
+from .ordering import GROUP as L
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -61,137 +50,103 @@ def advance_and_measure(problem, body, plate, force, equilibrium, relaxation, re
     mu, wall_mu = problem.friction
     pair, ids, rows = problem.pair.reshape(problem.pair.size), problem.pair_body, problem.pair.shape[1]
     ids = ids.reshape(ids.size)
-    flat, flat_force, wall, wall_body = (
-        body.reshape(body.size),
-        force.reshape(force.size),
-        problem.wall,
-        problem.wall_body,
-    )
-    first = len(force) - len(wall)
-    previous, previous_plate = body.copy(), plate.copy()
-    flat_previous = previous.reshape(previous.size)
-    work = workspace(WORKSPACE)
+    flat_force, target = force.reshape(force.size), equilibrium.reshape(equilibrium.size)
+    wall, wall_body, first = problem.wall, problem.wall_body, len(force) - len(problem.wall)
+    # The present record of every grain is followed by that at the end of the last sweep, in one line of the cache.
+    both, previous_plate = workspace(2 * RECORD * L * len(equilibrium)), plate.copy()
+    previous = both[RECORD:]
+    _set_both(body, both)
+    work, sums = workspace(2 * RECORD * L), workspace(SUMS)
     norm = 0.0
     for row in range(len(residuals)):
-        work[RESIDUAL:SIZE] = 0.0
-        work[SIZE:] = 1.0
+        clear_sums(sums)
         # Written twice, for compile-time row counts: with a variable row count, the few contacts in no group would take
         # a quarter of a sweep.
         pair_squares, wall_squares = 0.0, 0.0
         if rows == CELL_ROWS:
             for block in range(problem.grouped // L):
-                _relax_and_measure_group(
-                    pair, ids, flat, flat_previous, flat_force, work, block, CELL_ROWS, relaxation, mu
-                )
+                relax_and_measure(pair, CELL_ROWS, ids, both, flat_force, block, relaxation, mu, work, sums)
             for c in range(problem.grouped, first):
-                pair_squares += _measure_pair(
-                    pair, ids, flat, flat_previous, flat_force, work, c, CELL_ROWS, relaxation, mu
-                )
+                pair_squares += _measure_pair(pair, ids, both, previous, flat_force, sums, c, CELL_ROWS, relaxation, mu)
         else:
             for block in range(problem.grouped // L):
-                _relax_and_measure_group(pair, ids, flat, flat_previous, flat_force, work, block, ROWS, relaxation, mu)
+                relax_and_measure(pair, ROWS, ids, both, flat_force, block, relaxation, mu, work, sums)
             for c in range(problem.grouped, first):
-                pair_squares += _measure_pair(pair, ids, flat, flat_previous, flat_force, work, c, ROWS, relaxation, mu)
+                pair_squares += _measure_pair(pair, ids, both, previous, flat_force, sums, c, ROWS, relaxation, mu)
         for c in range(len(wall)):
             at = first + c
-            wall_squares += wall_residual(wall, wall_body, flat_previous, previous_plate, flat_force, at, c, wall_mu)
+            wall_squares += wall_residual(wall, wall_body, previous, 2, previous_plate, flat_force, at, c, wall_mu)
             fn, ft = flat_force[2 * at], flat_force[2 * at + 1]
-            relax_wall(wall, wall_body, flat, plate, flat_force, at, c, relaxation, wall_mu)
-            _accumulate_force(work, c % L, flat_force[2 * at], flat_force[2 * at + 1], fn, ft)
-        if row > 0:
-            for k in range(L):
-                pair_squares += work[RESIDUAL + k]
-            residuals[row - 1, 1] = relative_size(pair_squares + wall_squares, norm)
-        squares, total, bearing, greatest = 0.0, 0.0, 0.0, 0.0
-        for k in range(L):
-            squares += work[SQUARES + k]
-            total += work[NORMAL + k]
-            bearing += work[BEARING + k]
-            greatest = max(greatest, work[CHANGE + k] / work[SIZE + k])
-        norm, mean = np.sqrt(squares), total / max(bearing, 1.0)
-        residuals[row, 0] = np.sqrt(greatest)
-        residuals[row, 2] = greatest_force_residual(equilibrium, body) / mean if mean > 0.0 else 0.0
-        copy_vector(flat, flat_previous)
+            relax_wall(wall, wall_body, both, 2, plate, flat_force, at, c, relaxation, wall_mu)
+            add_force(sums, at % WIDTH, flat_force[2 * at], flat_force[2 * at + 1], fn, ft)
+        for block in range(len(equilibrium)):
+            finish_grains(both, target, block, sums)
         copy_matrix(plate, previous_plate)
+        if row > 0:
+            for k in range(WIDTH):
+                pair_squares += sums[RESIDUAL + k]
+            residuals[row - 1, 1] = relative_size(pair_squares + wall_squares, norm)
+        residuals[row, 0], norm, mean = measures_of(sums)
+        residuals[row, 2] = _greatest_unbalance(sums) / mean if mean > 0.0 else 0.0
+    for g in range(len(body)):
+        for q in range(RECORD):
+            body[g, q] = both[2 * RECORD * g + q]
     residuals[-1, 1] = measure_natural_map(problem, body, plate, force, norm)
+
+
+@njit(inline="always")
+def _set_both(body, both):  # type: ignore[no-untyped-def]
+    both[:] = 0.0  # a whole number of blocks
+    for g in range(len(body)):
+        for q in range(RECORD):
+            both[2 * RECORD * g + q] = body[g, q]
+            both[2 * RECORD * g + RECORD + q] = body[g, q]
+
+
+@njit(inline="always")
+def _greatest_unbalance(sums):  # type: ignore[no-untyped-def]
+    worst = 0.0
+    for k in range(WIDTH):
+        worst = max(worst, sums[UNBALANCE + k])
+    return np.sqrt(worst)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def greatest_force_residual(equilibrium, body):  # type: ignore[no-untyped-def]
+    """Compute the worst |ΣF| [N] on a grain from the distance of its velocity to the equilibrium velocity."""
+    flat, target, sums = body.reshape(body.size), equilibrium.reshape(equilibrium.size), workspace(SUMS)
+    clear_sums(sums)
+    for block in range(len(body) // L):
+        add_unbalance(flat, target, block, sums)
+    for g in range(len(body) // L * L, len(body)):
+        add_unbalance_of(flat, 1, target, g, sums)
+    return _greatest_unbalance(sums)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def advance_and_sample(problem, body, plate, force, equilibrium, relaxation, residuals, spacing):  # type: ignore[no-untyped-def]
     """Advance by one sweep per row of residuals (s, 3), measure one in `spacing` and the last; NaN in other rows."""
-    done = 0
+    done, before = 0, np.empty_like(force)
+    flat, flat_before = force.reshape(force.size), before.reshape(before.size)
     while done < len(residuals):
         last = min(done + spacing, len(residuals)) - 1
         residuals[done:last] = np.nan
         advance(problem, body, plate, force, last - done, relaxation)
-        advance_and_measure(problem, body, plate, force, equilibrium, relaxation, residuals[last : last + 1])
+        copy_vector(flat, flat_before)
+        advance(problem, body, plate, force, 1, relaxation)
+        residuals[last, 0], norm, mean = measure_forces(force, before)
+        residuals[last, 1] = measure_natural_map(problem, body, plate, force, norm)
+        residuals[last, 2] = greatest_force_residual(equilibrium, body) / mean if mean > 0.0 else 0.0
         done = last + 1
 
 
 @njit(inline="always")
-def _measure_pair(pair, ids, body, previous, force, work, c, rows, relaxation, mu):  # type: ignore[no-untyped-def]
-    pair_squares = pair_residual(pair, ids, previous, force, c, rows, mu)
+def _measure_pair(pair, ids, body, previous, force, sums, c, rows, relaxation, mu):  # type: ignore[no-untyped-def]
+    squares = pair_residual(pair, ids, previous, 2, force, c, rows, mu)
     fn, ft = force[2 * c], force[2 * c + 1]
-    relax_pair(pair, ids, body, force, c, rows, relaxation, mu)
-    _accumulate_force(work, c % L, force[2 * c], force[2 * c + 1], fn, ft)
-    return pair_squares
-
-
-@njit(inline="always")
-def _relax_and_measure_group(pair, ids, body, previous, force, work, block, rows, relaxation, mu):  # type: ignore[no-untyped-def]
-    p, e = block * rows * L, block * IDS
-    for k in range(0, L, WIDTH):
-        gather_differences(previous, ids, e + k, e + L + k, work, DIFFERENCES + k, L)
-        gather_records(body, ids, e + k, work, k, L)
-        gather_records(body, ids, e + L + k, work, 4 * L + k, L)
-    for k in range(L):
-        nx, ny, inverse_wnn = pair[p + k], pair[p + L + k], pair[p + 2 * L + k]
-        fn, ft = force[e + 2 * k], force[e + 2 * k + 1]
-        dx, dy = work[DIFFERENCES + k], work[DIFFERENCES + L + k]
-        un = dx * nx + dy * ny + pair[p + 3 * L + k]
-        ut = dy * nx - dx * ny - work[DIFFERENCES + 2 * L + k]
-        if rows == CELL_ROWS:
-            ut += pair[p + 4 * L + k]
-        work[RESIDUAL + k] += contact_residual(fn, ft, un, ut, inverse_wnn, THIRD * inverse_wnn, mu)
-        wn = relaxation * inverse_wnn
-        ax, ay, aw, ci = work[k], work[L + k], work[2 * L + k], work[3 * L + k]
-        bx, by, bw, cj = work[4 * L + k], work[5 * L + k], work[6 * L + k], work[7 * L + k]
-        dx, dy = bx - ax, by - ay
-        un = dx * nx + dy * ny + pair[p + 3 * L + k]
-        ut = dy * nx - dx * ny - aw - bw
-        if rows == CELL_ROWS:
-            ut += pair[p + 4 * L + k]
-        new_n, new_t = relax_contact(fn, ft, un, ut, wn, THIRD * wn, mu)
-        force[e + 2 * k] = new_n
-        force[e + 2 * k + 1] = new_t
-        _accumulate_force(work, k, new_n, new_t, fn, ft)
-        dn, dt = new_n - fn, new_t - ft
-        fx, fy, torque = dn * nx - dt * ny, dn * ny + dt * nx, 2.0 * dt
-        work[k] = ax - ci * fx
-        work[L + k] = ay - ci * fy
-        work[2 * L + k] = aw - ci * torque
-        work[4 * L + k] = bx + cj * fx
-        work[5 * L + k] = by + cj * fy
-        work[6 * L + k] = bw - cj * torque
-    for k in range(0, L, WIDTH):
-        scatter_records(work, k, L, body, ids, e + k)
-        scatter_records(work, 4 * L + k, L, body, ids, e + L + k)
-
-
-@njit(inline="always")
-def _accumulate_force(work, k, fn, ft, old_n, old_t):  # type: ignore[no-untyped-def]
-    """Add a force to the sums of a lane: squares, f_n, bearing, and the greatest change as a fraction."""
-    size = fn * fn + ft * ft
-    work[SQUARES + k] += size
-    work[NORMAL + k] += fn
-    work[BEARING + k] += 1.0 if fn > 0.0 else 0.0
-    # Fractions are compared without division: a/b > c/d where a d > c b.
-    change = (fn - old_n) * (fn - old_n) + (ft - old_t) * (ft - old_t)
-    size = size if size > 0.0 else change
-    top, bottom = work[CHANGE + k], work[SIZE + k]
-    greater = change * bottom > top * size
-    work[CHANGE + k] = change if greater else top
-    work[SIZE + k] = size if greater else bottom
+    relax_pair(pair, ids, body, 2, force, c, rows, relaxation, mu)
+    add_force(sums, c % WIDTH, force[2 * c], force[2 * c + 1], fn, ft)
+    return squares
 
 
 def equilibrium_shape(count: int) -> tuple[int, int, int]:
@@ -212,30 +167,3 @@ def find_equilibrium(problem, equilibrium):  # type: ignore[no-untyped-def]
         equilibrium[g // L, 0, g % L] = problem.body[g, 0] - problem.external[g, 0] * compliance
         equilibrium[g // L, 1, g % L] = problem.body[g, 1] - problem.external[g, 1] * compliance
         equilibrium[g // L, 2, g % L] = 1.0 / compliance if compliance > 0.0 else 0.0
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def greatest_force_residual(equilibrium, body):  # type: ignore[no-untyped-def]
-    """Compute the worst |ΣF| [N] on a grain from the distance of its velocity to the equilibrium velocity."""
-    current, target, full = body.reshape(body.size), equilibrium.reshape(equilibrium.size), len(body) // L
-    work = workspace(5 * L)
-    work[4 * L :] = 0.0
-    for block in range(full):
-        first, r = block * RECORD * L, block * 3 * L
-        for k in range(0, L, WIDTH):
-            transpose_records(current, first + RECORD * k, work, k, L)
-        for k in range(L):
-            x, y, impedance = work[k] - target[r + k], work[L + k] - target[r + L + k], target[r + 2 * L + k]
-            size, greatest = (x * x + y * y) * (impedance * impedance), work[4 * L + k]
-            work[4 * L + k] = size if size > greatest else greatest
-    worst = 0.0
-    for k in range(L):
-        worst = max(worst, work[4 * L + k])
-    for g in range(full * L, len(body)):
-        x, y, impedance = (
-            body[g, 0] - equilibrium[full, 0, g % L],
-            body[g, 1] - equilibrium[full, 1, g % L],
-            equilibrium[full, 2, g % L],
-        )
-        worst = max(worst, (x * x + y * y) * (impedance * impedance))
-    return np.sqrt(worst)

@@ -3,6 +3,7 @@ import pytest
 from rodsight.solver.bodies.packing import Material
 from rodsight.solver.contacts.contacts import detect_contacts
 from rodsight.solver.nlgs.problem import assemble
+from rodsight.solver.nlgs.sweeping.grain_records import RECORD
 from rodsight.solver.nlgs.sweeping.ordering import GROUP, visiting_order
 
 from tests.packings import squeezed_heap
@@ -72,7 +73,7 @@ def test_the_problem_records_the_order(heap):
     pairs = len(problem.rows) - len(problem.wall)
     assert np.array_equal(np.sort(problem.rows), np.arange(contacts.count))
     for c in range(pairs):
-        assert tuple(problem.pair_body[c // GROUP, :, c % GROUP]) == (
+        assert tuple(problem.pair_body[c // GROUP, :, c % GROUP] // RECORD) == (
             contacts.i[problem.rows[c]],
             contacts.j[problem.rows[c]],
         )
