@@ -14,6 +14,7 @@ from rodsight.solver.nlgs.sweeping.kernels import (
 )
 from rodsight.solver.nlgs.sweeping.measured_sweeps import (
     advance_and_measure,
+    advance_and_sample,
     equilibrium_shape,
     find_equilibrium,
     greatest_force_residual,
@@ -154,6 +155,21 @@ def test_sweeps_have_the_same_residuals_however_many_are_done_at_once(case):
     for row in range(len(one_by_one)):
         advance_and_measure(problem, *again, equilibrium_of(problem), 1.0, one_by_one[row : row + 1])
     assert np.array_equal(at_once, one_by_one)
+
+
+@pytest.mark.parametrize("spacing", [1, 3, 10])
+def test_sampled_sweeps_have_the_residuals_of_measured_ones(swept, spacing):
+    problem, count = swept.assemble(), 7
+    force = make_guess(swept)[problem.rows].copy()
+    body, plate = state_of(problem, force)
+    sampled = [each.copy() for each in (body, plate, force)]
+    every, some = np.empty((count, 3)), np.empty((count, 3))
+    advance_and_measure(problem, body, plate, force, equilibrium_of(problem), 1.0, every)
+    advance_and_sample(problem, *sampled, equilibrium_of(problem), 1.0, some, spacing)
+    measured = [*range(spacing - 1, count - 1, spacing), count - 1]
+    assert np.array_equal(some[measured], every[measured])
+    assert np.all(np.isnan(np.delete(some, measured, axis=0)))
+    assert all(np.array_equal(one, other) for one, other in zip(sampled, (body, plate, force), strict=True))
 
 
 @pytest.mark.parametrize("size", [4, GROUP])
