@@ -86,9 +86,10 @@ def penalise_friction(frame: FrameForces, check: FrictionCheck | None, *, measur
         return widen_for_friction(frame, check.low, check.measured, 1.0 / COVERAGE_FACTOR) if measured else frame
     words = (
         f"the motion fits a friction of {check.measured:.2f} ({check.low:.2f} to {check.high:.2f}) better than the "
-        f"given {check.given:g}; smooth walls, a base with friction or a wrong step look the same"
+        f"given {check.given:g}, and smooth walls, a base with friction or a wrong step look the same"
     )
-    penalised = replace(frame, trust_penalties="; ".join(filter(None, (words, frame.trust_penalties))))
+    # last: it widens the intervals, and the trust contains the power gap that it follows from
+    penalised = replace(frame, trust_penalties="; ".join(filter(None, (frame.trust_penalties, words))))
     if frame.sliding_probability is not None:
         slides = sliding_probability_at(
             frame.sliding_probability, check.given, check.measured, 1.0 - frame.position_weight
