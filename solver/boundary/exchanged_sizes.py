@@ -21,6 +21,7 @@ INSIDE = 3.0  # touching neighbours that outweigh one inside which the grain lie
 # and by chance the hole that it is in may have the size of a greater one.
 LESSER, GREATER = 1.5, 2.5
 USUAL, HARD = 0.98, 0.5  # quantile of the overlaps of other grains, and its limit over that of a touching pair
+TIGHT = 0.1  # of a touching pair: median overlap of a grain with its neighbours that is let pass whatever others have
 ROUNDS = 20
 MOST = 0.3  # fraction of the grains: if more seem exchanged, something else is wrong
 
@@ -50,7 +51,8 @@ def find_exchanged_sizes(position: Array, radius: Array, classes: NDArray[np.int
     -------
     (n,)
         Radii [m]; the stated ones where no other size is clearly better. All stay as stated where more than MOST would
-        change, or where the other grains overlap so much that an overlap shows no size.
+        change, or where the other grains overlap so much that an overlap shows no size. A loose grain in a hole that is
+        a little too small for a greater size stays as stated, too: it would overlap its neighbours more than others do.
 
     Notes
     -----
@@ -82,8 +84,14 @@ def find_exchanged_sizes(position: Array, radius: Array, classes: NDArray[np.int
     kept = ~(exchanged[pairs.grain] | exchanged[pairs.other])
     overlap = (radius[pairs.grain] + radius[pairs.other] - pairs.distance)[kept]
     usual = float(np.quantile(np.append(overlap[overlap > 0.0], 0.0), USUAL))
-    certain = exchanged.mean() <= MOST and usual < HARD * touch
-    return np.where(exchanged, found, radius) if certain else radius
+    if exchanged.mean() > MOST or not usual < HARD * touch:
+        return radius
+    own = found[pairs.grain] + found[pairs.other] - pairs.distance
+    for grain in np.flatnonzero(exchanged & (found > radius)).tolist():
+        its = own[(pairs.grain == grain) & (own > 0.0)]
+        if len(its) and np.median(its) > max(usual, TIGHT * touch):
+            exchanged[grain] = False
+    return np.where(exchanged, found, radius)
 
 
 def _candidate_pairs(position: Array, reach: float) -> tuple[_Pairs, int]:

@@ -75,11 +75,12 @@ def test_neighbours_of_an_exchanged_grain_keep_their_sizes(packing) -> None:
     assert np.array_equal(find_exchanged_sizes(position, stated, classes), radius)
 
 
-@pytest.mark.parametrize(("neighbours", "grows"), [(2, False), (3, True)])
-def test_a_loose_grain_in_a_hole_of_another_size_is_greater_only_if_it_touches_three(neighbours, grows) -> None:
+# (neighbours, how much too small the hole is for the greater size [m], whether the grain is of that size)
+@pytest.mark.parametrize(("neighbours", "narrow", "grows"), [(2, 0.0, False), (3, 0.0, True), (3, 3e-4, False)])
+def test_a_loose_grain_in_a_hole_is_greater_only_if_it_touches_three_and_fits(neighbours, narrow, grows) -> None:
     small, large = 0.007, 0.011
     angle = 2.0 * np.pi * np.arange(neighbours) / neighbours
-    around = 2.0 * large * np.column_stack([np.cos(angle), np.sin(angle)])
+    around = (2.0 * large - narrow) * np.column_stack([np.cos(angle), np.sin(angle)])
     elsewhere = np.column_stack([np.linspace(0.2, 0.5, 4), np.zeros(4)])
     position = np.concatenate([[[0.0, 0.0]], around, elsewhere])[None]
     radius = np.append(small, np.full(neighbours + 4, large))
