@@ -7,6 +7,8 @@ have any leading axes (…); side = None: all walls are straight.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +16,9 @@ from .grains import Array
 
 STRAIGHT, IN, OUT = 0, 1, -1  # shape of a wall: straight, or a circle with the packing inside or outside
 CORNERS = 72  # of the polygon that draws a circle
-ACROSS = 0.05  # radii by which a grain reaches beyond the line of a wall that ends beside it
+# Radii by which a grain past the end of a wall reaches beyond its line: from the first on it may touch the end instead,
+# from the second on it can touch nothing else.
+NEAR_END, ACROSS = 0.01, 0.05
 ALIKE = 0.9  # cosine of the greatest angle of two walls that face the same way
 Sides = NDArray[np.int8] | None
 
@@ -127,18 +131,56 @@ def faces_walls(
     -------
     (k,)
         True beside the wall. A straight wall is taken to go on for a radius past its ends, but neither along another
-        wall that faces the same way, as in a box that is split, nor across a grain, as one beside a footing.
+        wall that faces the same way, as in a box that is split, nor where a grain touches the end, see `nearest_ends`.
     """
     rows, shape = endpoints[wall], None if side is None else side[wall]
     near = beside_wall(rows, shape, point, radius)
     past = near & ~beside_wall(rows, shape, point, np.zeros(1))
     if not past.any():
         return near
-    across = distance_from_walls(rows, shape, point) < (1.0 - ACROSS) * radius
+    elsewhere = nearest_ends(rows, shape, point, radius).touched
     another = beside_another(endpoints, side, point)
     if another is not None:
-        across |= another[np.arange(len(wall)), wall]
-    return near & ~(past & across)
+        elsewhere |= another[np.arange(len(wall)), wall]
+    return near & ~(past & elsewhere)
+
+
+class NearestEnds(NamedTuple):
+    """Ends of straight walls that are nearest to grains."""
+
+    touched: NDArray[np.bool_]  # (k,) whether the grain can touch the end, and not the face
+    distance: Array  # (k,) [m] of its centre from the end
+    normal: Array  # (k, 2) unit vectors from the centre to the end
+
+
+def nearest_ends(endpoints: Array, side: Sides, point: Array, radius: Array) -> NearestEnds:
+    """Find which grains past the end of a straight wall touch that end, as beside a footing or in a box that is split.
+
+    Parameters
+    ----------
+    endpoints : (k, 2, 2)
+        The wall of every pair [m].
+    side : (k,)
+        Its shape.
+    point : (k, 2)
+        Centre of the grain [m].
+    radius : (k,)
+        Radius of the grain [m].
+
+    Notes
+    -----
+    A grain that overlaps the line of the wall by o is at the end if o > .05 R, or if o > .01 R and it is nearer to
+    touching the end than to touching the line: walls may be stated a little too short, and soft grains overlap them.
+    """
+    past = ~beside_wall(endpoints, side, point, np.zeros(1))
+    overlap = radius - distance_from_walls(endpoints, side, point)
+    away = endpoints - point[:, None]
+    apart = np.linalg.norm(away, axis=2)
+    row, end = np.arange(len(point)), apart.argmin(axis=1)
+    distance = apart[row, end]
+    touched = past & (overlap > NEAR_END * radius) & (distance > 0.0)
+    touched &= (overlap > ACROSS * radius) | (np.abs(distance - radius) < overlap)
+    return NearestEnds(touched, distance, away[row, end] / np.where(distance > 0.0, distance, 1.0)[:, None])
 
 
 def beside_another(endpoints: Array, side: Sides, point: Array) -> NDArray[np.bool_] | None:

@@ -19,6 +19,7 @@ from .wall_shapes import STRAIGHT, Sides, all_sides, wall_distance
 
 PARALLEL = 0.1  # sine of the angle between two walls below which they do not bound each other
 BEYOND_END = 0.2  # of a wall's length: so far beyond its ends it still bounds another one
+ON_FACE = 1.0 - 1e-9  # cosine of the angle between the normals of a contact and of its wall: less at an end of the wall
 NEGLIGIBLE_OVERHANG = 1e-3  # of the length: within the precision of ends
 
 
@@ -137,13 +138,13 @@ class Walls:
         plate : (c,)
             Carrier of each wall; the wall itself where its motion is imposed.
         along_normal, along_tangent : (c,)
-            n·p and t·p, with p the outward normal of the plate: 1 and 0 on the plate itself, also on a circle under
-            load.
+            n·p and t·p, with p the outward normal of the plate: 1 and 0 on its face, also on a circle under load.
         """
         carrier = self.carrier[wall]
-        fixed = (carrier >= 0) & (carrier != wall)
         plate = np.where(carrier >= 0, carrier, wall).astype(np.int32)
         outward = self.outward[plate]
+        at_end = ~self.curved[plate] & (np.einsum("ij,ij->i", normal, outward) < ON_FACE)
+        fixed = (carrier >= 0) & ((carrier != wall) | at_end)
         along_normal = np.where(fixed, np.einsum("ij,ij->i", normal, outward), 1.0)
         along_tangent = np.where(fixed, normal[:, 0] * outward[:, 1] - normal[:, 1] * outward[:, 0], 0.0)
         return plate, along_normal, along_tangent

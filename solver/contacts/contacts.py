@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..bodies.cell import Cell
 from ..bodies.disc_pairs import find_disc_pairs
 from ..bodies.grains import Array, Grains
-from ..bodies.wall_shapes import Sides, distance_from_walls, faces_walls
+from ..bodies.wall_shapes import Sides, distance_from_walls, faces_walls, nearest_ends
 from ..bodies.walls import Walls
 from ..quantity import Quantity
 from .pairs import Keys, make_keys, split_keys
@@ -143,7 +143,7 @@ def measure_contacts(
         i, j = i[order], j[order]
     normal, gap, point, shift = np.empty((len(i), 2)), np.empty(len(i)), np.empty((len(i), 2)), None
     wall = np.flatnonzero(j >= n)
-    distance, normal[wall] = walls.distance(j[wall] - n, position[i[wall]])
+    distance, normal[wall] = _from_walls(grains.radius, position, walls, i[wall], j[wall] - n)
     gap[wall] = distance - grains.radius[i[wall]]
     if walls.cell is not None:
         pair, shift = j < n, np.zeros((len(i), 2))
@@ -203,12 +203,26 @@ def _with_images(cell: Cell, position: Array, rows: NDArray[np.intp], reach: flo
 def _wall_pairs(
     radius: Array, position: Array, present: NDArray[np.bool_], walls: Walls, threshold: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Find pairs of grain and wall; the grain must face the wall, which goes on for one radius past its ends."""
+    """Find pairs of grain and wall; the grain faces it, a straight one for a radius past its ends, or is at an end."""
     gap = distance_from_walls(walls.endpoints[None], _row(walls.side), position[:, None]) - radius[:, None]
     near = (gap < threshold) & (gap > -radius[:, None]) & present[:, None]
     i, w = np.nonzero(near)
     faces = faces_walls(walls.endpoints, walls.side, w, position[i], radius[i])
+    if not faces.all():
+        ends = nearest_ends(walls.endpoints[w], None if walls.side is None else walls.side[w], position[i], radius[i])
+        faces |= ends.touched & (ends.distance - radius[i] < threshold)
     return i[faces], w[faces]
+
+
+def _from_walls(
+    radius: Array, position: Array, walls: Walls, i: NDArray[np.int32], w: NDArray[np.int32]
+) -> tuple[Array, Array]:
+    """Distance (c,) [m] of grains i from walls w, or from the ends that they touch, and the outward normals (c, 2)."""
+    distance, normal = walls.distance(w, position[i])
+    ends = nearest_ends(walls.endpoints[w], None if walls.side is None else walls.side[w], position[i], radius[i])
+    if not ends.touched.any():
+        return distance, normal
+    return np.where(ends.touched, ends.distance, distance), np.where(ends.touched[:, None], ends.normal, normal)
 
 
 def _row(side: Sides) -> Sides:

@@ -34,6 +34,7 @@ MUTANTS = [
         ("np.stack([d[:, 1], -d[:, 0]], axis=1)", "np.stack([-d[:, 1], d[:, 0]], axis=1)"),
         ("velocity = v0 + s[:, None] * (v1 - v0)", "velocity = v0 + 0.5 * (v1 - v0)"),
         ("velocity = v0 + s[:, None] * (v1 - v0)", "velocity = v1 + s[:, None] * (v0 - v1)"),
+        ("((carrier != wall) | at_end)", "(carrier != wall)"),
     ),
     *mutants_of(
         "solver/bodies/wall_shapes.py",
@@ -42,6 +43,8 @@ MUTANTS = [
         ("np.where(apart > 0.0, side, np.nan)[..., None]", "np.where(apart > 0.0, 1.0, np.nan)[..., None]"),
         ("rotation = (angle - former_angle + np.pi) % (2.0 * np.pi) - np.pi", "rotation = angle - former_angle"),
         ("return beside if side is None else beside | (side != STRAIGHT)", "return beside"),
+        ("touched = past & (overlap > NEAR_END * radius)", "touched = past & (overlap > 0.0)"),
+        ("(np.abs(distance - radius) < overlap)", "(np.abs(distance - radius) < 0.0)"),
         ("circle_ends(centre - moved.mean(axis=-2), radius - widened", "circle_ends(centre, radius - widened"),
         ("walls_before(two, (1.0 - fraction) * wall_displacement", "walls_before(two, fraction * wall_displacement"),
     ),

@@ -12,6 +12,8 @@ MUTANTS = [
         ("arm = radius[a] + 0.5 * gap[c]", "arm = radius[a]"),
         ("gap[c] = distance - radius[a] - radius[b]", "gap[c] = distance - 2.0 * radius[a]"),
         ("return i[faces], w[faces]", "return i, w"),
+        ("np.where(ends.touched, ends.distance, distance)", "distance"),
+        ("faces |= ends.touched & ", "faces |= False & "),
         ("kept = ~(grains.boundary[i] & grains.boundary[j])", "kept = ~(grains.boundary[i] | grains.boundary[j])"),
         ("x += shift[c, 0]", "x -= shift[c, 0]"),
         (

@@ -21,7 +21,7 @@ from rodsight.solver.bodies.wall_shapes import (
     walls_before,
 )
 from rodsight.solver.bodies.walls import Walls
-from rodsight.solver.contacts.contacts import detect_contacts, measure_contacts
+from rodsight.solver.contacts.contacts import detect_contacts, measure_contacts, measure_pairs
 from rodsight.solver.contacts.kinematics import equilibrium_matrix, relative_motion
 from rodsight.solver.statistics.stress import love_weber_stress, packing_area, wall_forces
 
@@ -217,8 +217,36 @@ def test_a_grain_touches_the_half_of_a_split_side_that_it_is_beside() -> None:
     assert faces.tolist() == [[True, False], [False, True], [False, True], [False, False]]
     past = np.array([[0.19, 0.105], [0.195, 0.105]])  # of a wall measured too short; beside a wall that ends
     assert faces_walls(split_side()[:1], None, np.zeros(2, int), past, np.full(2, 0.01)).tolist() == [True, False]
-    found = detect_contacts(rods(0.01, 0.01), beside[:2], np.ones(2, bool), Walls.at_rest(split_side()), 1e-4)
+    place = np.array([[0.19, 0.095], [0.195, 0.1095]])
+    found = detect_contacts(rods(0.01, 0.01), place, np.ones(2, bool), Walls.at_rest(split_side()), 1e-4)
     assert (found.j[found.with_wall] - 2).tolist() == [0, 1]
+
+
+# Place of a rod of 10 mm at the right end of a footing at y = .1, its gap [m], and the cosine of its normal with the
+# normal of the face.
+AT_FOOTING = [
+    ((0.18, 0.09), 0.0, 1.0),  # beneath it
+    ((0.201, 0.0901), -1e-4, 1.0),  # a little past its end: the footing may be stated too short
+    ((0.206, 0.092), 0.0, 0.8),  # on the end
+    ((0.2072, 0.0922), 6.15e-4, None),  # past it, and apart from its end
+]
+
+
+@pytest.mark.parametrize(("place", "gap", "cosine"), AT_FOOTING)
+def test_a_grain_past_the_end_of_a_wall_touches_the_end(place, gap, cosine) -> None:
+    footing = Walls.at_rest(np.array([[[0.2, 0.1], [0.1, 0.1]]]), np.array([50.0]))
+    grains, position = rods(0.01), np.array([place])
+    found = detect_contacts(grains, position, np.ones(1, bool), footing, 2e-4)
+    assert found.count == (cosine is not None)
+    measured = measure_pairs(grains, position, footing, np.array([1]))  # at any distance, as in other photographs
+    assert measured.gap == pytest.approx([gap], abs=1e-5)
+    if cosine is not None:
+        assert found.normal[0] @ [0.0, 1.0] == pytest.approx(cosine, abs=1e-12)
+        assert np.linalg.norm(found.point[0] - place) == pytest.approx(0.01 + 0.5 * gap, abs=1e-6)
+        _, along_normal, along_tangent = footing.plate_components(np.zeros(1, int), found.normal)
+        assert along_normal == pytest.approx([cosine])
+        assert along_tangent[0] ** 2 == pytest.approx(1.0 - cosine**2)
+        assert (along_normal[0] == 1.0) == (cosine == 1.0)  # exactly, on the face
 
 
 def test_a_grain_past_the_end_of_one_wall_is_not_beyond_it() -> None:
