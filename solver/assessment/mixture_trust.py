@@ -13,13 +13,17 @@ import numpy as np
 
 from ..bodies.grains import Array
 from .evidence import Evidence
+from .expected_correlation import MEASURES
 from .fitted import FITTED
 
 POSTERIOR_CALIBRATION = 0.95  # true over self-estimated correlation of the posterior, where its input is right
 MAX_TRUST = 0.995  # above it a field would have all the weight
 RELIABILITY_DISAGREEMENT: tuple[float, float] = tuple(FITTED["motion_reliability"]["disagreement"])
 RELIABILITY_CORRECTION: tuple[float, float] = tuple(FITTED["motion_reliability"]["correction"])
-WEIGHT_TERMS = ("constant", "correction", "unclear", "sliding", "members", "nearer")  # of the weight in fitted.toml
+# of the weight in fitted.toml
+WEIGHT_TERMS = (
+    "constant", "correction", "unclear", "sliding", "members", "nearer", "hidden", "residual", "agreement",
+)  # fmt: skip
 LEAST_WEIGHT: float = FITTED["position_weight"]["least"]  # weights below it are not used
 # Of 1 − R of a sound frame, the fraction that its motion estimate errs by on average (sixteen scenarios, seed 0). A
 # reliability of LOW or less is taken as the expectation itself.
@@ -143,14 +147,17 @@ def evident_position_weight(evidence: Evidence) -> float:
     ----------
     evidence : Evidence
         Of the motion estimate: the correction ε, by which forces must correct the measured motion; the power gap p,
-        by which friction opposes the sliding less than it could; and the correlation c of the position-only estimate
-        with the motion-free balance of overlaps: what positions show.
+        by which friction opposes the sliding less than it could; the measure h of hidden sliding, without which motion
+        shows little; the residual u that no forces balance, because walls, friction or contacts are not as stated; the
+        correlation b with the position-only estimate; and the correlations c of that estimate and d of the motion with
+        the motion-free balance of overlaps: what positions show.
 
     Returns
     -------
     float
         w = 1/(1 + exp(−s)) in (0, 1), with a from fitted.toml and
-        s = a_0 + a_1 ln ε + a_2 ln(1 − c) + a_3 ln p + a_4 ln D + a_5 (arctanh c − arctanh d).
+        s = a_0 + a_1 ln ε + a_2 ln(1 − c) + a_3 ln p + a_4 ln D + a_5 (arctanh c − arctanh d)
+            + a_6 ln h + a_7 ln u + a_8 arctanh b.
     """
     table = FITTED["position_weight"]
     score = float(position_weight_terms(evidence) @ np.array([table[name] for name in WEIGHT_TERMS]))
@@ -172,14 +179,21 @@ def position_weight_terms(evidence: Evidence) -> Array:
         logarithm(evidence.power_gap, table["default_sliding"], table["sliding_range"]),
         logarithm(evidence.disagreement, table["default_members"], table["members_range"]),
         _how_much_nearer(evidence, table["nearer_range"]),
+        logarithm(MEASURES["hidden_sliding"](evidence), table["default_hidden"], table["hidden_range"]),
+        logarithm(evidence.unbalance, table["default_residual"], table["residual_range"]),
+        float(np.nan_to_num(_arctanh(evidence.agreement, table["nearer_range"]))),
     ])  # fmt: skip
 
 
 def _how_much_nearer(evidence: Evidence, limits: list[float]) -> float:
     """How much nearer the position-only estimate is to the balance of overlaps than the motion is; 0: unknown."""
+    nearer = _arctanh(evidence.position_agreement, limits) - _arctanh(evidence.overlap_agreement, limits)
+    return float(np.nan_to_num(nearer))
+
+
+def _arctanh(correlation: float, limits: list[float]) -> float:
     low, high = limits
-    near = np.arctanh(np.clip([evidence.position_agreement, evidence.overlap_agreement], low, high))
-    return float(np.nan_to_num(near[0] - near[1]))
+    return float(np.arctanh(np.clip(correlation, low, high)))
 
 
 def fused_trust(first: float, second: float, agreement: float, weight: float) -> float:

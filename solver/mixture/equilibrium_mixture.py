@@ -11,7 +11,7 @@ from ..contacts.contacts import Contacts
 from ..convex.program import Balance, ConvexSettings
 from ..posterior.frame_posterior import FramePosterior
 from ..statistics.stress import love_weber_stress
-from .equilibrium_projection import project_mixed_field
+from .equilibrium_projection import WeightedSum, project_mixed_field
 from .frame_mixture import ForceEstimate, Mixture, Softness, mix_on_contacts
 from .stress_matching import stress_factors
 
@@ -53,19 +53,24 @@ def mix_in_equilibrium(
 
     Notes
     -----
-    Of hard grains under a known load the stress and the sum of f_n follow from sliding, not from positions.
+    Of hard grains under a known load the stress and the sum of f_n follow from sliding, not from positions. They count
+    as far as the motion does: by its weight 1 − u, as a power of the stress factors.
     """
-    total = None
+
+    def mix(placed: FramePosterior, weight: float | None) -> Mixture:
+        return mix_on_contacts(
+            frame.contacts, motion, placed, reliability, scale_known=frame.scale_known, softness=softness,
+            position_weight=weight,
+        )  # fmt: skip
+
+    mixture, wanted = mix(positions, position_weight), None
     if frame.scale_known and softness is None and not np.isnan(reliability):
-        total = float(motion.fn.sum())
+        motion_weight = 1.0 - mixture.position_weight
+        wanted = WeightedSum(float(motion.fn.sum()), motion_weight)
         if not frame.has_weight:
             stress = love_weber_stress(frame.contacts, motion.fn, motion.ft, frame.position, 1.0, 1.0)
             factor = stress_factors(positions.contacts, positions.fn, positions.ft, frame.position, stress)
-            positions = replace(positions, stress_factor=factor)
-    mixture = mix_on_contacts(
-        frame.contacts, motion, positions, reliability, scale_known=frame.scale_known, softness=softness,
-        position_weight=position_weight,
-    )  # fmt: skip
-    given = mixture.fn, mixture.ft, mixture.fn_sd, frame.settings, total
+            mixture = mix(replace(positions, stress_factor=factor**motion_weight), mixture.position_weight)
+    given = mixture.fn, mixture.ft, mixture.fn_sd, frame.settings, wanted
     projected = project_mixed_field(frame.balance, *given, soft=softness is not None)
     return replace(mixture, fn=projected.fn, ft=projected.ft) if projected.converged else mixture

@@ -10,6 +10,7 @@ six packings in the apparatus of corner discs by 2 % on average, all of it along
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,13 +30,20 @@ RAISED = 3.0  # the second field that is projected is this often as much larger 
 MAX_RAISED = 0.3  # … but by no more than this fraction
 
 
+class WeightedSum(NamedTuple):
+    """A sum of f_n that the field in equilibrium shall have, as far as it counts."""
+
+    total: float  # [N]
+    weight: float  # 0 … 1 beside the sum that the projection gives
+
+
 def project_mixed_field(
     balance: Balance,
     fn: Array,
     ft: Array,
     fn_sd: Array,
     settings: ConvexSettings,
-    total: float | None = None,
+    wanted: WeightedSum | None = None,
     *,
     soft: bool = False,
 ) -> ConvexForces:
@@ -51,8 +59,8 @@ def project_mixed_field(
         Standard deviations of f_n [N].
     settings : ConvexSettings
         Settings of the convex program; `balance` is the price of a force residual.
-    total : float, optional
-        Sum of f_n [N] that the field in equilibrium shall have; None: any.
+    wanted : WeightedSum, optional
+        Sum of f_n that the field in equilibrium shall have; None: any.
     soft : bool
         Whether forces follow from the overlaps of soft grains.
 
@@ -61,7 +69,8 @@ def project_mixed_field(
     The strict projection is accepted if rms(Δf_n) ≤ 0.45 rms(fn_sd). Otherwise the price is multiplied by 0.1, 0.03,
     0.01, 0.003 or 0.001, the first for which rms(Δf_n) ≤ 0.15 rms(fn_sd), 0.35 of it for soft grains, else the last.
 
-    Where the sum of the accepted f_n differs from the total S, a multiple of the given field is projected, too, and
+    Where the sum S_1 of the accepted f_n differs from S = (1 − w) S_1 + w S_0 with the wanted sum S_0 and its weight w,
+    a multiple of the given field is projected, too, and
 
         f = f_1 + θ (f_2 − f_1),  θ = (S − S_1)/(S_2 − S_1),  0 ≤ θ ≤ 1,
 
@@ -69,9 +78,10 @@ def project_mixed_field(
     """
     limit = MAX_CHANGE_SOFT if soft else MAX_CHANGE_RELAXED
     found, price = _project_within(balance, (fn, ft, fn_sd), settings, limit)
-    if total is None or not found.converged:
+    if wanted is None or not found.converged:
         return found
     reached = float(found.fn.sum())
+    total = reached + wanted.weight * (wanted.total - reached)
     if not reached > 0.0 or abs(total - reached) <= KEPT_TOTAL * reached:
         return found
     raised = 1.0 + float(np.clip(RAISED * (total / reached - 1.0), -MAX_RAISED, MAX_RAISED))

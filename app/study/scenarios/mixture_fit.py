@@ -47,12 +47,14 @@ from ...solver.statistics.agreement import pearson
 from ...synthetic.scenarios.preset_names import ScenarioName
 from ...synthetic.scenarios.scenario_folder import make_scenario
 from .scenario_score import ScenarioSolution, StudyPlan, correct_scenario, solve_scenario, true_forces
+from .trust_study import LEFT_OUT
 
 ALONE = "solver.positions=never", "solver.keep_members=true"
 FIRST, STRIDE = 1, 2  # of the frames that are read
-WEIGHTS = np.linspace(0.0, 1.0, 11)  # of the position-only estimate
-TOLERATED, PRICE = 0.003, 3.0  # loss against the better part; its price beyond, over that of a loss against the best
-RIDGE, STARTS, STEPS = 1e-3, 3, 3000  # of coefficients of terms in standard deviations
+WEIGHTS = np.array([0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0])  # of the position-only estimate
+TOLERATED, PRICE = 0.003, 6.0  # loss against the better part; its price beyond, over that of a loss against the best
+TOLERATED_NEW, PRICE_NEW = 0.001, 6.0  # the same of a kind against the mixture of the present weights
+RIDGE, STARTS, STEPS = 1e-3, 3, 4000  # of coefficients of terms in standard deviations
 FOLDS = 5
 EXCESS = 0.005  # loss against the better part that is counted
 
@@ -63,7 +65,7 @@ class MixtureSample:
 
     kind: NDArray[np.str_]  # (f,)
     terms: Array  # (f, t) of the logarithm of w/(1 − w)
-    r: Array  # (f, 11) correlation of the mixture of every weight with the truth; of weight 0 the motion estimate
+    r: Array  # (f, 7) correlation of the mixture of every weight with the truth; of weight 0 the motion estimate
     positions: Array  # (f,) correlation of the position-only estimate, on contacts of its own
 
     def select(self, chosen: NDArray[np.bool_]) -> MixtureSample:
@@ -105,9 +107,10 @@ def sample_mixtures(
 
 
 def fit_weight(sample: MixtureSample) -> Array:
-    """Coefficients (t,) of the terms; every kind counts the same."""
+    """Coefficients (t,) of the terms; every kind counts the same, and none is to lose against the present weights."""
     _, index, count = np.unique(sample.kind, return_inverse=True, return_counts=True)
     weight, best, better = 1.0 / count[index], sample.r.max(axis=1), sample.better
+    present = np.bincount(index, _mixed(sample)) / count
     middle, spread = sample.terms.mean(axis=0), sample.terms.std(axis=0)
     middle[0], spread[0] = 0.0, 1.0  # the constant
     terms = (sample.terms - middle) / spread
@@ -115,7 +118,12 @@ def fit_weight(sample: MixtureSample) -> Array:
     def loss(coefficients: Array) -> float:
         r = sample.reached(expit(terms @ coefficients))
         lost = best - r + PRICE * np.maximum(better - r - TOLERATED, 0.0)
-        return float(np.average(lost, weights=weight)) + RIDGE * float(coefficients[1:] @ coefficients[1:])
+        worse = np.maximum(present - np.bincount(index, r) / count - TOLERATED_NEW, 0.0)
+        return (
+            float(np.average(lost, weights=weight))
+            + PRICE_NEW * float(worse.mean())
+            + RIDGE * float(coefficients[1:] @ coefficients[1:])
+        )
 
     starts = np.random.default_rng(0).normal(0.0, 0.3, (STARTS, terms.shape[1]))
     options = {"maxiter": STEPS, "maxfev": STEPS, "fatol": 1e-7, "adaptive": True}
@@ -126,9 +134,13 @@ def fit_weight(sample: MixtureSample) -> Array:
 
 
 def print_mixture(console: Console, sample: MixtureSample) -> None:
-    """Print what the present weights reach of every kind, the fitted coefficients, and what they reach left out."""
+    """Print what the present weights reach of every kind, the fitted coefficients, and what they reach left out.
+
+    Kinds on which the trust is judged are not read by the fit.
+    """
     _print_kinds(console, sample)
-    coefficients = fit_weight(sample)
+    read = ~np.isin(sample.kind, list(LEFT_OUT))
+    coefficients = fit_weight(sample.select(read) if read.any() else sample)
     values = ", ".join(f"{name} = {x:.3f}" for name, x in zip(WEIGHT_TERMS, coefficients, strict=True))
     console.print(f"[position_weight] {values}", markup=False, highlight=False, soft_wrap=True)
     weight, kinds = np.zeros(len(sample.r)), np.unique(sample.kind)
@@ -182,7 +194,7 @@ def _print_kinds(console: Console, sample: MixtureSample) -> None:
 
 
 def _mix_frames(solution: ScenarioSolution, true: Sequence[tuple[Keys, Array]]) -> list[tuple[Array, Array, float]]:
-    """Terms (t,) and correlations (11,) of the frames of hard grains under a known load, and of positions alone."""
+    """Terms (t,) and correlations (7,) of the frames of hard grains under a known load, and of positions alone."""
     sequence, found = solution.sequence, []
     if not sequence.packing.scale_is_known:
         return []

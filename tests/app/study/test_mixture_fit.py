@@ -13,7 +13,7 @@ from rodsight.study.scenarios.scenario_score import solve_scenario
 from rodsight.synthetic.scenarios.scenario_folder import make_scenario
 from scipy.special import expit
 
-COUNT = 120
+COUNT = 240
 
 
 def _sample(seed: int) -> tuple[MixtureSample, np.ndarray]:

@@ -40,6 +40,7 @@ MUTANTS = [
         ("fn) <= limit * sd:", "fn) <= 0.0 * sd:"),
         ("MAX_CHANGE_SOFT if soft else", "MAX_CHANGE_RELAXED if soft else"),
         ("share = min((total - reached) / change, 1.0)", "share = 1.0"),
+        ("reached + wanted.weight * (wanted.total - reached)", "wanted.total"),
         ("found.ft + share * (other.ft - found.ft)", "found.ft"),
         ("change * (total - reached) > 0.0", "True"),
     ),
@@ -58,7 +59,8 @@ MUTANTS = [
     *mutants_of(
         "solver/mixture/equilibrium_mixture.py",
         "tests/solver/sequence/test_mixed_total.py",
-        ("total = float(motion.fn.sum())", "total = None"),
+        ("motion_weight = 1.0 - mixture.position_weight", "motion_weight = mixture.position_weight"),
+        ("stress_factor=factor**motion_weight", "stress_factor=None"),
         ("if not frame.has_weight:", "if frame.has_weight:"),
     ),
     *mutants_of(

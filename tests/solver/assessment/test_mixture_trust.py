@@ -100,11 +100,24 @@ def test_positions_weigh_more_where_forces_correct_the_motion_and_overlaps_are_c
     assert weight(math.nan, math.nan, math.nan) == weight(0.1, 0.5, 0.1)
 
 
-def test_positions_weigh_more_where_members_disagree_and_the_motion_is_farther_from_the_overlaps():
-    given = replace(SOUND, correction=0.1, position_agreement=0.9, overlap_agreement=0.7, power_gap=0.2)
+def test_positions_weigh_more_where_members_disagree_and_the_estimates_agree_less():
+    given = replace(SOUND, correction=0.1, position_agreement=0.9, agreement=0.8, power_gap=0.2)
     weight = evident_position_weight(given)
-    assert evident_position_weight(replace(given, overlap_agreement=0.95)) < weight
-    assert evident_position_weight(replace(given, overlap_agreement=0.4)) > weight
+    assert evident_position_weight(replace(given, agreement=0.95)) < weight
+    assert evident_position_weight(replace(given, agreement=0.4)) > weight
     assert evident_position_weight(replace(given, disagreement=2.0 * given.disagreement)) > weight
     unknown, equal = (replace(given, overlap_agreement=each) for each in (math.nan, 0.9))
     assert evident_position_weight(unknown) == evident_position_weight(equal)
+    unknown, none = (replace(given, agreement=each) for each in (math.nan, 0.0))
+    assert evident_position_weight(unknown) == evident_position_weight(none)
+
+
+def test_positions_weigh_more_where_sliding_is_hidden_or_no_forces_of_the_motion_balance():
+    given = replace(SOUND, correction=0.1, position_agreement=0.9, power_gap=0.2, unbalance=1e-3)
+    weight = evident_position_weight(given)
+    still, sliding = (
+        replace(given, information=replace(given.information, slide_signal=signal)) for signal in (0.05, 8.0)
+    )
+    assert evident_position_weight(still) > evident_position_weight(sliding)
+    assert evident_position_weight(replace(given, unbalance=0.1)) > weight
+    assert evident_position_weight(replace(given, unbalance=math.nan)) == weight  # not known

@@ -18,6 +18,7 @@ from rodsight.solver.mixture.equilibrium_projection import (
     MAX_CHANGE_RELAXED,
     MAX_CHANGE_SOFT,
     RELAXATION,
+    WeightedSum,
     project_mixed_field,
 )
 
@@ -115,18 +116,18 @@ def residual(balance, found):
     return np.abs(balance.matrix @ force - balance.load).max()
 
 
-@pytest.mark.parametrize("factor", [0.995, 1.005])
-def test_field_in_equilibrium_has_the_given_sum_of_forces(factor, monkeypatch):
+@pytest.mark.parametrize(("factor", "weight"), [(0.995, 1.0), (1.005, 1.0), (1.01, 0.4)])
+def test_field_in_equilibrium_has_the_wanted_sum_of_forces_by_its_weight(factor, weight, monkeypatch):
     fn, ft, balance = lattice()
     noisy = fn * (1 + 0.6 * np.random.default_rng(5).normal(size=len(fn)))
     fn_sd = 10.0 * fn  # equilibrium is strict
     nearest = project_mixed_field(balance, noisy, ft, fn_sd, ConvexSettings())
-    total = factor * nearest.fn.sum()
+    wanted = WeightedSum(factor * nearest.fn.sum(), weight)
     monkeypatch.setattr(
         equilibrium_projection, "RAISED", 60.0
     )  # one plate and two side walls leave the sum little room
-    found = project_mixed_field(balance, noisy, ft, fn_sd, ConvexSettings(), total)
-    assert found.fn.sum() == pytest.approx(total, rel=1e-9)
+    found = project_mixed_field(balance, noisy, ft, fn_sd, ConvexSettings(), wanted)
+    assert found.fn.sum() == pytest.approx((1.0 + weight * (factor - 1.0)) * nearest.fn.sum(), rel=1e-9)
     assert residual(balance, found) < 2.0 * residual(balance, nearest)
     assert np.all(np.abs(found.ft) <= 0.25 * found.fn + 1e-9)
 
@@ -135,7 +136,7 @@ def test_sum_that_the_loads_forbid_is_approached_but_no_load_is_violated():
     fn, ft, balance = lattice()
     fn_sd = 10.0 * fn
     nearest = project_mixed_field(balance, fn, ft, fn_sd, ConvexSettings())
-    found = project_mixed_field(balance, fn, ft, fn_sd, ConvexSettings(), 3.0 * nearest.fn.sum())
+    found = project_mixed_field(balance, fn, ft, fn_sd, ConvexSettings(), WeightedSum(3.0 * nearest.fn.sum(), 1.0))
     assert nearest.fn.sum() < found.fn.sum() < 1.5 * nearest.fn.sum()
     assert residual(balance, found) < 0.01
 
@@ -143,7 +144,9 @@ def test_sum_that_the_loads_forbid_is_approached_but_no_load_is_violated():
 def test_sum_that_is_reached_needs_no_second_projection():
     fn, ft, balance = lattice()
     nearest = project_mixed_field(balance, fn, ft, 10.0 * fn, ConvexSettings())
-    found = project_mixed_field(balance, fn, ft, 10.0 * fn, ConvexSettings(), 1.0005 * nearest.fn.sum())
+    found = project_mixed_field(
+        balance, fn, ft, 10.0 * fn, ConvexSettings(), WeightedSum(1.0005 * nearest.fn.sum(), 1.0)
+    )
     np.testing.assert_array_equal(found.fn, nearest.fn)
 
 
@@ -152,5 +155,7 @@ def test_sum_that_moves_away_is_not_extrapolated(monkeypatch):
     noisy = fn * (1 + 0.6 * np.random.default_rng(5).normal(size=len(fn)))
     nearest = project_mixed_field(balance, noisy, ft, 10.0 * fn, ConvexSettings())
     monkeypatch.setattr(equilibrium_projection, "RAISED", -3.0)  # the second field is smaller where the sum must grow
-    found = project_mixed_field(balance, noisy, ft, 10.0 * fn, ConvexSettings(), 1.02 * nearest.fn.sum())
+    found = project_mixed_field(
+        balance, noisy, ft, 10.0 * fn, ConvexSettings(), WeightedSum(1.02 * nearest.fn.sum(), 1.0)
+    )
     np.testing.assert_array_equal(found.fn, nearest.fn)

@@ -1,4 +1,4 @@
-"""A mixture of both estimates has the motion estimate's sum of forces after its projection onto equilibrium, too."""
+"""A mixture of both estimates has the motion estimate's sum of forces and stress as far as the motion counts."""
 
 from __future__ import annotations
 
@@ -16,24 +16,37 @@ pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs th
 
 
 @pytest.mark.thorough
-def test_projected_mixture_keeps_the_sum_of_the_motion(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_projected_mixture_has_the_sum_of_the_motion_by_its_weight(monkeypatch: pytest.MonkeyPatch) -> None:
     sheared = simulate_shear(0.25, 6)
-    mix, sums, used = estimates._mix, [], []
+    mix, project, match = estimates._mix, equilibrium_mixture.project_mixed_field, equilibrium_mixture.mix_on_contacts
+    weights, sums, powers = [], [], []
 
     def spy(problem, estimate, *arguments):
         mixed = mix(problem, estimate, *arguments)
         if problem.motion.ends_here and mixed.mixture.position_weight > 0.0:
-            sums.append(mixed.fn.sum() / estimate.fn.sum())
+            weights.append((1.0 - mixed.mixture.position_weight, float(estimate.fn.sum())))
         return mixed
 
-    def factors(*arguments):
-        used.append(true_factors(*arguments))
-        return used[-1]
+    def projected(balance, fn, ft, fn_sd, settings, wanted=None, **further):
+        found = project(balance, fn, ft, fn_sd, settings, wanted, **further)
+        if wanted is not None:
+            alone = float(project(balance, fn, ft, fn_sd, settings, **further).fn.sum())
+            sums.append((*wanted, float(found.fn.sum()), alone))
+        return found
 
-    true_factors = equilibrium_mixture.stress_factors
+    def mixed(contacts, motion, positions, *arguments, **further):
+        found = match(contacts, motion, positions, *arguments, **further)
+        if positions.stress_factor is not None:
+            powers.append((float(np.ptp(positions.stress_factor)), found.position_weight))
+        return found
+
     monkeypatch.setattr(estimates, "_mix", spy)
-    monkeypatch.setattr(equilibrium_mixture, "stress_factors", factors)
+    monkeypatch.setattr(equilibrium_mixture, "project_mixed_field", projected)
+    monkeypatch.setattr(equilibrium_mixture, "mix_on_contacts", mixed)
     list(solve_sequence(sheared.packing, sheared.snapshots, SequenceSettings(positions="always")))
     assert len(sums) > 2
-    assert np.abs(np.array(sums) - 1.0).max() < 2e-3
-    assert len(used) == len(sums)  # no weight: the stress is matched in every frame that has a motion
+    assert len(powers) == len(sums)  # no weight: the stress is matched in every frame that has a motion
+    assert min(power for power, _ in powers) > 0.0
+    for (weight, motion), (total, counted, found, alone) in zip(weights, sums, strict=True):
+        assert (total, counted) == pytest.approx((motion, weight))
+        assert found == pytest.approx(alone + weight * (total - alone), rel=2e-3)
