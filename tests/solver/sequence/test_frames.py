@@ -212,7 +212,8 @@ def test_members_may_disagree_on_the_scale_where_weight_alone_sets_it():
         loaded, pressure=np.full(len(loaded.pressure), np.nan), material=Material(0.25, 0.25, 0, (0, -9.81))
     )
     assert np.isfinite(loaded.pressure).any()
-    found = [run(each, snapshots, ENSEMBLE)[1][1].evidence.scale_disagreement for each in (loaded, heavy)]
+    alone = replace(ENSEMBLE, positions="never")  # 40 sweeps balance this heap so little that a mixture of it fails
+    found = [run(each, snapshots, alone)[1][1].evidence.scale_disagreement for each in (loaded, heavy)]
     assert np.isnan(found[0])
     assert found[1] > 0
 
