@@ -7,13 +7,17 @@ TESTS = "tests/solver/contacts"
 MUTANTS = [
     *mutants_of(
         "solver/contacts/contacts.py",
+        "tests/solver/bodies/test_wall_shapes.py",
+        ("np.where(ends.touched, ends.distance, distance)", "distance"),
+        ("faces |= ends.touched & ", "faces |= False & "),
+    ),
+    *mutants_of(
+        "solver/contacts/contacts.py",
         TESTS,
         ("np.stack([-self.normal[:, 1], self.normal[:, 0]]", "np.stack([self.normal[:, 1], -self.normal[:, 0]]"),
         ("arm = radius[a] + 0.5 * gap[c]", "arm = radius[a]"),
         ("gap[c] = distance - radius[a] - radius[b]", "gap[c] = distance - 2.0 * radius[a]"),
         ("return i[faces], w[faces]", "return i, w"),
-        ("np.where(ends.touched, ends.distance, distance)", "distance"),
-        ("faces |= ends.touched & ", "faces |= False & "),
         ("kept = ~(grains.boundary[i] & grains.boundary[j])", "kept = ~(grains.boundary[i] | grains.boundary[j])"),
         ("x += shift[c, 0]", "x -= shift[c, 0]"),
         (

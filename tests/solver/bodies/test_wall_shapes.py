@@ -227,6 +227,7 @@ def test_a_grain_touches_the_half_of_a_split_side_that_it_is_beside() -> None:
 AT_FOOTING = [
     ((0.18, 0.09), 0.0, 1.0),  # beneath it
     ((0.201, 0.0901), -1e-4, 1.0),  # a little past its end: the footing may be stated too short
+    ((0.20199, 0.0902), 0.0, 0.98),  # nearer to touching the end than the line
     ((0.206, 0.092), 0.0, 0.8),  # on the end
     ((0.2072, 0.0922), 6.15e-4, None),  # past it, and apart from its end
 ]
@@ -241,11 +242,11 @@ def test_a_grain_past_the_end_of_a_wall_touches_the_end(place, gap, cosine) -> N
     measured = measure_pairs(grains, position, footing, np.array([1]))  # at any distance, as in other photographs
     assert measured.gap == pytest.approx([gap], abs=1e-5)
     if cosine is not None:
-        assert found.normal[0] @ [0.0, 1.0] == pytest.approx(cosine, abs=1e-12)
+        assert found.normal[0] @ [0.0, 1.0] == pytest.approx(cosine, abs=1e-4)
         assert np.linalg.norm(found.point[0] - place) == pytest.approx(0.01 + 0.5 * gap, abs=1e-6)
         _, along_normal, along_tangent = footing.plate_components(np.zeros(1, int), found.normal)
-        assert along_normal == pytest.approx([cosine])
-        assert along_tangent[0] ** 2 == pytest.approx(1.0 - cosine**2)
+        assert along_normal == pytest.approx([cosine], abs=1e-4)
+        assert along_tangent[0] ** 2 == pytest.approx(1.0 - cosine**2, abs=1e-4)
         assert (along_normal[0] == 1.0) == (cosine == 1.0)  # exactly, on the face
 
 

@@ -7,6 +7,8 @@ import pytest
 from rodsight.tracking.registration.neighbour_kernels import find_nearest
 from rodsight.tracking.registration.neighbours import local_motion, nearby_median, overlaps
 
+pytestmark = pytest.mark.unit
+
 
 @pytest.fixture
 def positions() -> np.ndarray:
