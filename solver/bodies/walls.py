@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .cell import Cell
 from .grains import Array
-from .wall_shapes import STRAIGHT, Sides, all_sides, wall_distance
+from .wall_shapes import STRAIGHT, NearestEnds, Sides, all_sides, nearest_ends, wall_distance
 
 PARALLEL = 0.1  # sine of the angle between two walls below which they do not bound each other
 BEYOND_END = 0.2  # of a wall's length: so far beyond its ends it still bounds another one
@@ -152,6 +152,10 @@ class Walls:
     def distance(self, wall: NDArray[np.integer], place: Array) -> tuple[Array, Array]:
         """Return distances (c,) [m] of points (c, 2) [m] from walls (c,), and outward normals; see `wall_distance`."""
         return wall_distance(self.endpoints[wall], None if self.side is None else self.side[wall], place)
+
+    def nearest_ends(self, wall: NDArray[np.integer], place: Array, radius: Array) -> NearestEnds:
+        """Return the ends of walls (c,) nearest to grains at places (c, 2) [m]; see `wall_shapes.nearest_ends`."""
+        return nearest_ends(self.endpoints[wall], None if self.side is None else self.side[wall], place, radius)
 
     def velocity_at(self, wall: NDArray[np.int32], point: Array) -> Array:
         """Return the velocity (c, 2) [m/s] of walls (c,) at points (c, 2) [m].

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..bodies.cell import Cell
 from ..bodies.disc_pairs import find_disc_pairs
 from ..bodies.grains import Array, Grains
-from ..bodies.wall_shapes import Sides, distance_from_walls, faces_walls, nearest_ends
+from ..bodies.wall_shapes import Sides, distance_from_walls, faces_walls
 from ..bodies.walls import Walls
 from ..quantity import Quantity
 from .pairs import Keys, make_keys, split_keys
@@ -209,7 +209,7 @@ def _wall_pairs(
     i, w = np.nonzero(near)
     faces = faces_walls(walls.endpoints, walls.side, w, position[i], radius[i])
     if not faces.all():
-        ends = nearest_ends(walls.endpoints[w], None if walls.side is None else walls.side[w], position[i], radius[i])
+        ends = walls.nearest_ends(w, position[i], radius[i])
         faces |= ends.touched & (ends.distance - radius[i] < threshold)
     return i[faces], w[faces]
 
@@ -219,7 +219,7 @@ def _from_walls(
 ) -> tuple[Array, Array]:
     """Distance (c,) [m] of grains i from walls w, or from the ends that they touch, and the outward normals (c, 2)."""
     distance, normal = walls.distance(w, position[i])
-    ends = nearest_ends(walls.endpoints[w], None if walls.side is None else walls.side[w], position[i], radius[i])
+    ends = walls.nearest_ends(w, position[i], radius[i])
     if not ends.touched.any():
         return distance, normal
     return np.where(ends.touched, ends.distance, distance), np.where(ends.touched[:, None], ends.normal, normal)
