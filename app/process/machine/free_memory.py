@@ -6,19 +6,22 @@ import ctypes
 import sys
 from contextlib import suppress
 
-LARGE = 1 << 18  # [bytes]
-M_MMAP_THRESHOLD = -3  # of mallopt(3)
+LARGE = 1 << 22  # [bytes]
+KEPT = 1 << 26  # [bytes] of free memory at the end of the heap
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of mallopt(3)
 
 
 def return_large_blocks() -> None:
-    """Make the C library return blocks from LARGE bytes on as soon as they are freed.
+    """Make the C library return blocks from LARGE bytes on as soon as they are freed, and keep KEPT bytes of others.
 
-    A recording of 1000 photographs of 250 rods takes 15 MB less, and 4 MB less after it was solved in the same process.
-    Tracking photographs takes 4 % longer.
+    Every block that was returned costs the time of new pages: with blocks from 256 kB on, 30 frames of 1172 rods took a
+    sixth more processor time, for 16 MB less at the peak.
     """
     if sys.platform == "linux":
         with suppress(OSError, AttributeError):  # another C library
-            ctypes.CDLL(None).mallopt(M_MMAP_THRESHOLD, LARGE)
+            library = ctypes.CDLL(None)
+            library.mallopt(M_MMAP_THRESHOLD, LARGE)
+            library.mallopt(M_TRIM_THRESHOLD, KEPT)
 
 
 def release_free_memory() -> None:
