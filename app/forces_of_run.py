@@ -14,7 +14,7 @@ from .inference.infer_sequence import FIRST_FRAME, infer_sequence
 from .inference.inputs import Inputs
 from .inference.solve_frames import InferenceObserver
 from .process.errors import InputError, RunError, UndeterminedError
-from .process.machine.free_memory import release_free_memory
+from .process.machine.free_memory import keep_freed_blocks, release_free_memory
 from .results.hdf5.store import Provenance, load_results, save_results
 from .results.results import Results
 from .run_folder import FAILURES, RESULTS, SUMMARY, Run
@@ -38,7 +38,8 @@ def infer_forces(run: Run, inputs: Inputs, origin: Provenance, log: VerdictLog) 
     run.kernels.wait(SOLVER_KERNELS)
     try:
         observer = _RunObserver(run, log)
-        results = infer_sequence(inputs, observer, store)
+        with keep_freed_blocks():
+            results = infer_sequence(inputs, observer, store)
     except UndeterminedError as error:
         raise InputError(run.experiment.file, f"key {error.key}", str(error)) from None
     if all(frame.status is FrameStatus.FAILED for frame in results.frames):

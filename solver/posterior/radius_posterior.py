@@ -114,8 +114,6 @@ def stack_frames(pairs: Sequence[SamplerPairs], grains: Sequence[SamplerGrains])
     """Concatenate frames; each has its own grains and known sums, and all have the same radii."""
     first_grain = np.cumsum([0] + [len(each.lever) for each in grains])
     first_group = np.cumsum([0] + [len(each.group_load) for each in grains])
-    first_pair = np.cumsum([0] + [len(each.i) for each in pairs])
-    first_row = np.cumsum([0] + [len(each.row) for each in grains])
     shifted_pairs = [
         each._replace(
             i=each.i + first_grain[k],
@@ -124,12 +122,8 @@ def stack_frames(pairs: Sequence[SamplerPairs], grains: Sequence[SamplerGrains])
         )
         for k, each in enumerate(pairs)
     ]
-    shifted_grains = [
-        each._replace(row=each.row + first_pair[k], start=each.start[:-1] + first_row[k])
-        for k, each in enumerate(grains)
-    ]
-    stacked = SamplerGrains(*(np.concatenate(field) for field in zip(*shifted_grains, strict=True)))
+    stacked = SamplerGrains(*(np.concatenate(field) for field in zip(*grains, strict=True)))
     return (
         SamplerPairs(*(np.concatenate(field) for field in zip(*shifted_pairs, strict=True))),
-        stacked._replace(start=np.append(stacked.start, first_row[-1]), radius_sd=grains[0].radius_sd),
+        stacked._replace(radius_sd=grains[0].radius_sd),
     )

@@ -6,7 +6,7 @@ import math
 
 from numba import njit
 
-from .sampler.draws import ROOT_TWO_PI, mills_ratio
+from .sampler.truncated_normal import ROOT_TWO_PI, mills_ratio
 
 MIN_DENSITY = 1e-300
 FAR = 8.0  # standard deviations beyond which the normal CDF counts as 0 or 1

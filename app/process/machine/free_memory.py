@@ -1,27 +1,54 @@
-"""Memory that was freed goes back to the system between the stages of a run."""
+"""Memory that was freed goes back to the system between the stages of a run, and is kept while one computes."""
 
 from __future__ import annotations
 
 import ctypes
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 
-LARGE = 1 << 22  # [bytes]
-KEPT = 1 << 26  # [bytes] of free memory at the end of the heap
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of mallopt(3)
+# mallopt(3): blocks from the first size on return as soon as they are freed, and so does that much at the heap's end.
+M_MMAP_THRESHOLD, M_TRIM_THRESHOLD = -3, -1
+RETURNED = {M_MMAP_THRESHOLD: 1 << 18, M_TRIM_THRESHOLD: 1 << 17}  # [bytes]
+KEPT = {M_MMAP_THRESHOLD: 1 << 22, M_TRIM_THRESHOLD: 1 << 26}  # [bytes]
+
+_returning = False
 
 
 def return_large_blocks() -> None:
-    """Make the C library return blocks from LARGE bytes on as soon as they are freed, and keep KEPT bytes of others.
+    """Make the C library return blocks from a quarter of a megabyte on as soon as they are freed.
 
-    Every block that was returned costs the time of new pages: with blocks from 256 kB on, 30 frames of 1172 rods took a
-    sixth more processor time, for 16 MB less at the peak.
+    A recording of 1000 photographs of 250 rods takes 15 MB less, and 4 MB less after it was solved in the same process.
+    Tracking photographs takes 4 % longer.
     """
+    global _returning  # noqa: PLW0603 the C library has one setting, too
+    _returning = True
+    _set(RETURNED)
+
+
+@contextmanager
+def keep_freed_blocks() -> Iterator[None]:
+    """Keep freed blocks while forces are computed, where they are returned otherwise.
+
+    Every block that is returned costs the time of new pages: of 30 frames of 1172 rods a tenth of the processor time.
+    """
+    if not _returning:
+        yield
+        return
+    _set(KEPT)
+    try:
+        yield
+    finally:
+        _set(RETURNED)
+        release_free_memory()
+
+
+def _set(sizes: dict[int, int]) -> None:
     if sys.platform == "linux":
         with suppress(OSError, AttributeError):  # another C library
             library = ctypes.CDLL(None)
-            library.mallopt(M_MMAP_THRESHOLD, LARGE)
-            library.mallopt(M_TRIM_THRESHOLD, KEPT)
+            for parameter, size in sizes.items():
+                library.mallopt(parameter, size)
 
 
 def release_free_memory() -> None:

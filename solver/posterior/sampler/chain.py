@@ -10,7 +10,8 @@ from ...bodies.grains import Array
 from ..frame_evidence import FrameEvidence
 from ..posterior_settings import PosteriorSettings
 from .gibbs_sweeps import run
-from .records import SamplerGrains, SamplerPairs, initial_state, make_workspace
+from .records import SamplerGrains, SamplerPairs
+from .state import start_chain
 
 EXACT = 1e-7  # mean diameters: standard deviation of an error that counts as exact
 EDGE_WEIGHT = 0.01  # balance weight at the edge: unknown outside forces are of the mean force's size, not a tenth of it
@@ -34,10 +35,10 @@ def run_chain(
     rng: np.random.Generator,
 ) -> ChainMeans:
     """Run one sweep for each row of the schedule (sweeps, 11), from a state without errors."""
-    state = initial_state(pairs, grains, settings.compliance)
-    sums = (np.zeros((len(pairs.i), 5)), np.zeros((len(state.body), 6)), np.zeros(4))
-    run(rng, pairs, grains, schedule, state, make_workspace(pairs, grains), settings.kept, sums)
-    return ChainMeans(*(each / settings.kept for each in sums))
+    chain = start_chain(pairs, grains, settings.compliance, rng)
+    by_pair, by_grain, common = np.zeros((len(chain.state.fn), 5)), np.zeros((len(grains.lever), 6)), np.zeros(4)
+    run(chain, schedule, settings.kept, (by_pair, by_grain, common))
+    return ChainMeans(*(each / settings.kept for each in (by_pair[chain.pairs.place], by_grain, common)))
 
 
 def make_sampler_pairs(evidence: FrameEvidence) -> SamplerPairs:
@@ -59,18 +60,12 @@ def make_sampler_pairs(evidence: FrameEvidence) -> SamplerPairs:
 
 def make_sampler_grains(evidence: FrameEvidence) -> SamplerGrains:
     """Convert the grains of a frame to lengths in mean diameters and forces in force units."""
-    contacts, n = evidence.contacts, len(evidence.radius)
-    rows, wall = np.arange(contacts.count), contacts.with_wall
-    grain = np.concatenate([contacts.i, contacts.j[~wall]])
-    order = np.argsort(grain, kind="stable")
     return SamplerGrains(
         lever=evidence.radius / evidence.radius.mean(),
         load=evidence.known.weight / evidence.known.unit,
         balance_weight=_balance_weight(evidence),
         centre_sd=np.maximum(evidence.centre_sd / evidence.diameter, EXACT),
         radius_sd=np.maximum(evidence.radius_sd / evidence.diameter, EXACT),
-        start=np.concatenate([[0], np.cumsum(np.bincount(grain, minlength=n))]).astype(np.int64),
-        row=np.concatenate([rows, rows[~wall]])[order].astype(np.int64),
         group_load=evidence.known.total / evidence.known.unit,
         **_measured_pressures(evidence),
     )

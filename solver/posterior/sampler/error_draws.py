@@ -1,4 +1,4 @@
-"""The loop over grains: the error of every radius together with the errors of its centre in all frames."""
+"""The loop over blocks of grains: the error of every radius together with the errors of its centre in all frames."""
 
 from __future__ import annotations
 
@@ -7,14 +7,20 @@ import math
 import numpy as np
 from numba import njit
 
-from .records import CX, CY, DELTA
+from ...nlgs.sweeping.grain_records import WIDTH, gather_records, scatter_records
+from .blocks import RECORD
+from .lanes import LANES, draw_uniform, logarithm, numbers, singles
+from .state import CX, CY, DELTA
+from .truncated_normal import normal_of
+
+L = LANES
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def factorize_errors(grains, model, workspace):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def factorize_errors(chain):  # type: ignore[no-untyped-def]
     """Factorise the precision of every grain's errors, which follows from b of its pairs alone.
 
-    A row of workspace.centre_factor holds 1/L₀₀, L₁₀, 1/L₁₁ and v; workspace.precision holds Q.
+    The rows of workspace.centre_factor are 1/L₀₀, L₁₀, 1/L₁₁ and v; workspace.radius_precision holds Q.
 
     Notes
     -----
@@ -22,34 +28,50 @@ def factorize_errors(grains, model, workspace):  # type: ignore[no-untyped-def]
 
         L_k L_kᵀ = I/σ_c² + Σ n' n'ᵀ/b²,  v_k = L_k⁻¹ Σ n'/b²,  Q = 1/σ_r² + Σ_k (Σ 1/b² − |v_k|²)
     """
-    start, row, centre_sd, radius_sd = grains.start, grains.row, grains.centre_sd, grains.radius_sd
-    direction, observation, centre_factor = workspace.direction, workspace.observation, workspace.centre_factor
-    n, m = len(radius_sd), len(centre_sd)
-    for g in range(n):
-        workspace.precision[g] = 1.0 / radius_sd[g] ** 2
-    for g in range(m):
-        xx = 1.0 / centre_sd[g] ** 2
-        yy, xy, xr, yr, total = xx, 0.0, 0.0, 0.0, 0.0
-        for q in range(start[g], start[g + 1]):
-            weight, nx, ny = observation[row[q], 0], direction[q, 0], direction[q, 1]
-            xx += weight * nx * nx
-            xy += weight * nx * ny
-            yy += weight * ny * ny
-            xr += weight * nx
-            yr += weight * ny
-            total += weight
-        l11 = math.sqrt(xx)
-        l21 = xy / l11
-        l22 = math.sqrt(yy - l21 * l21)
-        tx = xr / l11
-        ty = (yr - l21 * tx) / l22
-        centre_factor[g, 0], centre_factor[g, 1], centre_factor[g, 2] = 1.0 / l11, l21, 1.0 / l22
-        centre_factor[g, 3], centre_factor[g, 4] = tx, ty
-        workspace.precision[g % n] += total - tx * tx - ty * ty
+    grains, workspace, weight_of = chain.grains, chain.workspace, chain.workspace.precision
+    start, frames, precision = grains.start, grains.frames, workspace.radius_precision
+    pair, present = grains.pair.reshape(grains.pair.size), grains.present.reshape(grains.present.size)
+    normal, weights = grains.normal.reshape(grains.normal.size), workspace.pair_weight.reshape(grains.pair.size)
+    factor = workspace.centre_factor.reshape(workspace.centre_factor.size)
+    work = numbers(12 * L)  # sums of n'n'ᵀ/b² (3), n'/b² (2) and 1/b²; 1/b² of a row; the rows of the factor
+    for block in range(len(precision)):
+        for k in range(L):
+            precision[block, k] = grains.radius_precision[block, k]
+        for frame in range(block * frames, (block + 1) * frames):
+            for k in range(L):
+                work[k] = work[L + k] = grains.centre_precision[frame, k]
+            for k in range(2 * L, 6 * L):
+                work[k] = 0.0
+            for row in range(start[frame], start[frame + 1]):
+                for k in range(L):
+                    nx, ny = normal[2 * row * L + k], normal[(2 * row + 1) * L + k]
+                    weight = present[row * L + k] * weight_of[pair[row * L + k]]
+                    work[6 * L + k] = weight
+                    work[k] += weight * nx * nx
+                    work[L + k] += weight * ny * ny
+                    work[2 * L + k] += weight * nx * ny
+                    work[3 * L + k] += weight * nx
+                    work[4 * L + k] += weight * ny
+                    work[5 * L + k] += weight
+                for k in range(L):
+                    weights[row * L + k] = work[6 * L + k]
+            for k in range(L):
+                l11 = math.sqrt(work[k])
+                l21 = work[2 * L + k] / l11
+                l22 = math.sqrt(work[L + k] - l21 * l21)
+                tx = work[3 * L + k] / l11
+                ty = (work[4 * L + k] - l21 * tx) / l22
+                work[7 * L + k], work[8 * L + k], work[9 * L + k] = 1.0 / l11, l21, 1.0 / l22
+                work[10 * L + k], work[11 * L + k] = tx, ty
+                work[5 * L + k] -= tx * tx + ty * ty
+            for k in range(5 * L):
+                factor[5 * frame * L + k] = work[7 * L + k]
+            for k in range(L):
+                precision[block, k] += work[5 * L + k]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def draw_errors(rng, grains, workspace, state):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def draw_errors(chain):  # type: ignore[no-untyped-def]
     """Draw the error δ of every radius together with those of its centre, ε_k, in all frames k.
 
     Notes
@@ -60,33 +82,56 @@ def draw_errors(rng, grains, workspace, state):  # type: ignore[no-untyped-def]
 
         δ | rest ~ N(Q⁻¹ Σ_k (Σ r/b² − v_k·u_k), Q⁻¹),  L_kᵀ ε_k = u_k − δ v_k + N(0, I).
     """
-    body, start, row = state.body, grains.start, grains.row
-    direction, other, observation = workspace.direction, workspace.other, workspace.observation
-    centre_factor, precision = workspace.centre_factor, workspace.precision
-    n, m = len(precision), len(body)
-    mean = np.empty((m // n, 2))  # u of every frame
-    for first in range(n):
-        linear = 0.0
-        for k in range(m // n):
-            g = first + k * n
-            bx, by = 0.0, 0.0
-            for q in range(start[g], start[g + 1]):
-                c, o, nx, ny = row[q], other[q], direction[q, 0], direction[q, 1]
-                rest = observation[c, 1]
-                if o >= 0:
-                    rest += nx * body[o, CX] + ny * body[o, CY] - body[o, DELTA]
-                rest *= observation[c, 0]
-                bx += nx * rest
-                by += ny * rest
-                linear += rest
-            ux = bx * centre_factor[g, 0]
-            uy = (by - centre_factor[g, 1] * ux) * centre_factor[g, 2]
-            linear -= centre_factor[g, 3] * ux + centre_factor[g, 4] * uy
-            mean[k, 0], mean[k, 1] = ux, uy
-        delta = linear / precision[first] + rng.standard_normal() / math.sqrt(precision[first])
-        for k in range(m // n):
-            g = first + k * n
-            u = mean[k, 0] - delta * centre_factor[g, 3] + rng.standard_normal()
-            v = mean[k, 1] - delta * centre_factor[g, 4] + rng.standard_normal()
-            y = v * centre_factor[g, 2]
-            body[g, CX], body[g, CY], body[g, DELTA] = (u - centre_factor[g, 1] * y) * centre_factor[g, 0], y, delta
+    grains, state, workspace = chain.grains, chain.state, chain.workspace
+    body, record, other = state.error.reshape(state.error.size), grains.record.reshape(grains.record.size), grains.other
+    other, pair, weights = other.reshape(other.size), grains.pair.reshape(grains.pair.size), workspace.pair_weight
+    weights, normal = weights.reshape(weights.size), grains.normal.reshape(grains.normal.size)
+    factor, start, frames = workspace.centre_factor.reshape(workspace.centre_factor.size), grains.start, grains.frames
+    residual, precision, random = workspace.residual, workspace.radius_precision, state.random
+    # Rows: a record of the others; Σ n' r/b² (2); Σ r/b² less v·u, of all frames; δ.
+    work, mean = numbers(8 * L), numbers(2 * frames * L)
+    uniform = singles(2 * L)
+    for block in range(len(precision)):
+        for k in range(L):
+            work[6 * L + k] = 0.0
+        for frame in range(frames):
+            at = block * frames + frame
+            for k in range(2 * L):
+                work[4 * L + k] = 0.0
+            for row in range(start[at], start[at + 1]):
+                for k in range(0, L, WIDTH):
+                    gather_records(body, other, row * L + k, work, k, L)
+                for k in range(L):
+                    nx, ny = normal[2 * row * L + k], normal[(2 * row + 1) * L + k]
+                    rest = residual[pair[row * L + k]] + nx * work[CX * L + k] + ny * work[CY * L + k]
+                    rest = (rest - work[DELTA * L + k]) * weights[row * L + k]
+                    work[4 * L + k] += nx * rest
+                    work[5 * L + k] += ny * rest
+                    work[6 * L + k] += rest
+            f, u = 5 * at * L, 2 * frame * L
+            for k in range(L):
+                ux = work[4 * L + k] * factor[f + k]
+                uy = (work[5 * L + k] - factor[f + L + k] * ux) * factor[f + 2 * L + k]
+                work[6 * L + k] -= factor[f + 3 * L + k] * ux + factor[f + 4 * L + k] * uy
+                mean[u + k], mean[u + L + k] = ux, uy
+        draw_uniform(random, uniform, 0)
+        for k in range(L):
+            drawn = np.float64(normal_of(logarithm(uniform[k])))
+            work[7 * L + k] = work[6 * L + k] / precision[block, k] + drawn / math.sqrt(precision[block, k])
+        for frame in range(frames):
+            at = block * frames + frame
+            f, u = 5 * at * L, 2 * frame * L
+            draw_uniform(random, uniform, 0)
+            draw_uniform(random, uniform, L)
+            for k in range(2 * L):
+                uniform[k] = normal_of(logarithm(uniform[k]))
+            for k in range(L):
+                delta = work[7 * L + k]
+                x = mean[u + k] - delta * factor[f + 3 * L + k] + np.float64(uniform[k])
+                y = (mean[u + L + k] - delta * factor[f + 4 * L + k] + np.float64(uniform[L + k])) * factor[f + 2 * L + k]
+                work[CX * L + k], work[CY * L + k] = (x - factor[f + L + k] * y) * factor[f + k], y
+                work[DELTA * L + k], work[3 * L + k] = delta, 0.0
+            for k in range(0, L, WIDTH):
+                scatter_records(work, k, L, body, record, at * L + k)
+        for q in range(RECORD):  # the absent grain has no errors: walls and further places of short lists read it
+            body[RECORD * chain.size + q] = 0.0

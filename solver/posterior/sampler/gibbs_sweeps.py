@@ -1,4 +1,4 @@
-"""The sweeps of the Gibbs sampler: contact by contact, grain by grain, then the unknowns that all share.
+"""The sweeps of the Gibbs sampler: pairs by blocks, grains by blocks, then the unknowns that all share.
 
 Notes
 -----
@@ -26,52 +26,51 @@ from __future__ import annotations
 from numba import njit
 
 from .common_draws import draw_common, draw_scale
-from .contact_draws import draw_contacts, weigh_contacts
+from .contact_draws import draw_contacts, weigh_pairs
 from .error_draws import draw_errors, factorize_errors
-from .records import CX, ModelParameters
+from .records import ModelParameters
+from .state import CX, NORMAL_SUM
 
 
 @njit(cache=True, nogil=True)
-def run(rng, pairs, grains, schedule, state, workspace, kept, sums):  # type: ignore[no-untyped-def]
+def run(chain, schedule, kept, sums):  # type: ignore[no-untyped-def]
     """Run one sweep for each row of the schedule (sweeps, 11) and add up the last `kept` states.
 
-    A sweep draws (z, f, t, γ) of every pair in order, (δ, ε) of every grain in order, κ, o, and the scale of forces.
-    sums out: of z, z f, z t, (z f)², (z t)² (c, 5); of ε, δ, δ², Σ f and (Σ f)² (m, 6); of κ, κ², o, o²
-    (4,).
+    A sweep draws (z, f, t, γ) of the pairs, (δ, ε) of the grains, κ, o, and the scale of forces. sums out: of z, z f,
+    z t, (z f)², (z t)² (p, 5) in the places of the blocks; of ε, δ, δ², Σ f and (Σ f)² (m, 6); of κ, κ², o, o² (4,).
     """
     discarded = len(schedule) - kept
     for k in range(len(schedule)):
         a = schedule[k]
         model = ModelParameters(a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10])
         if k == 0 or (a != schedule[k - 1]).any():
-            weigh_contacts(pairs, grains, model, workspace)
-            factorize_errors(grains, model, workspace)
-        draw_contacts(rng, pairs, grains, model, workspace, state)
-        draw_errors(rng, grains, workspace, state)
-        draw_common(rng, pairs, model, workspace, state)
-        draw_scale(rng, pairs, grains, model, state)
+            weigh_pairs(chain, model)
+            factorize_errors(chain)
+        draw_contacts(chain, model)
+        draw_errors(chain)
+        draw_common(chain, model)
+        draw_scale(chain, model)
         if k >= discarded:
-            _add(state, sums)
+            _add(chain.state, sums)
 
 
 @njit(cache=True, nogil=True)
 def _add(state, sums):  # type: ignore[no-untyped-def]
     by_pair, by_grain, shared = sums
-    bearing, fn, ft, body, normal_sum = state.bearing, state.fn, state.ft, state.body, state.normal_sum
+    bearing, fn, ft, force, error = state.bearing, state.fn, state.ft, state.force, state.error
     for c in range(len(bearing)):
-        if bearing[c]:
-            f, t = fn[c], ft[c]
-            by_pair[c, 0] += 1.0
-            by_pair[c, 1] += f
-            by_pair[c, 2] += t
-            by_pair[c, 3] += f * f
-            by_pair[c, 4] += t * t
+        f, t = fn[c], ft[c]
+        by_pair[c, 0] += bearing[c]
+        by_pair[c, 1] += f
+        by_pair[c, 2] += t
+        by_pair[c, 3] += f * f
+        by_pair[c, 4] += t * t
     for g in range(len(by_grain)):
         for q in range(3):
-            by_grain[g, q] += body[g, CX + q]
-        by_grain[g, 3] += body[g, CX + 2] ** 2
-        by_grain[g, 4] += normal_sum[g]
-        by_grain[g, 5] += normal_sum[g] ** 2
+            by_grain[g, q] += error[g, CX + q]
+        by_grain[g, 3] += error[g, CX + 2] ** 2
+        by_grain[g, 4] += force[g, NORMAL_SUM]
+        by_grain[g, 5] += force[g, NORMAL_SUM] ** 2
     for q in range(2):
         shared[2 * q] += state.common[q]
         shared[2 * q + 1] += state.common[q] ** 2

@@ -1,23 +1,21 @@
 """The posterior of the sampler as one function, and a sweep whose conditional distributions follow from it alone.
 
 Every conditional is a Gaussian: its precision and mean are read from three values of the posterior. All sums over
-grains are formed anew for each value. Truncated normal draws are those of the product, which have tests of their own.
+grains are formed anew for each value. Draws are the inverse of the exact tail at the given uniform numbers.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from rodsight.solver.bodies.grains import Array
-from rodsight.solver.posterior.sampler.draws import draw_above, draw_between
 from rodsight.solver.posterior.sampler.records import ModelParameters, SamplerGrains, SamplerPairs
-from scipy.special import log_ndtr
+from scipy.special import log_ndtr, ndtri_exp
 
-HOPELESS = 100.0  # logarithm of the odds against bearing beyond which no random number is drawn
-AMBIGUOUS = (70.0, 130.0)  # logarithms about which the product may decide otherwise
+CERTAIN = 30.0  # logarithm of the odds against bearing that is more than the least uniform number
 SCALE_STEPS = 4
 
 
@@ -69,14 +67,20 @@ class Gaussian:
         everywhere = self.level + 0.5 * self.slope * self.mean + 0.5 * math.log(2.0 * math.pi) + math.log(self.sd)
         return everywhere + (float(log_ndtr(self.mean / self.sd)) if positive else 0.0)
 
-    def draw_above(self, rng: np.random.Generator, low: float) -> float:
-        return self.mean + self.sd * draw_above(rng, (low - self.mean) / self.sd)
+    def draw_above(self, uniform: float, low: float) -> float:
+        bound = (low - self.mean) / self.sd
+        return self.mean + self.sd * float(-ndtri_exp(log_ndtr(-bound) + math.log(uniform)))
 
-    def draw_between(self, rng: np.random.Generator, low: float, high: float) -> float:
-        return self.mean + self.sd * draw_between(rng, (low - self.mean) / self.sd, (high - self.mean) / self.sd)
+    def draw(self, uniform: float) -> float:
+        return self.mean + self.sd * standard_normal(uniform)
 
-    def draw(self, rng: np.random.Generator) -> float:
-        return self.mean + self.sd * rng.standard_normal()
+    def log_ratio(self, x: float, other: float) -> float:
+        """Logarithm of the density at one place over that at another."""
+        return 0.5 * (((other - self.mean) / self.sd) ** 2 - ((x - self.mean) / self.sd) ** 2)
+
+
+def standard_normal(uniform: float) -> float:
+    return float(-ndtri_exp(math.log(uniform)))
 
 
 def resultants(pairs: SamplerPairs, grains: SamplerGrains, fn: Array, ft: Array) -> Array:
@@ -144,8 +148,8 @@ class PlainSampler:
         gauge += 0.5 * model.count_gauge / count * (z.sum() - model.expected_count) ** 2
         return float(balance + pressures + laws + errors + gauge)
 
-    def draw_contact(self, rng: np.random.Generator, state: PlainState, c: int) -> tuple[PlainState, str]:
-        """Draw (z, f, t, γ) of a pair; return which branch was followed, too."""
+    def draw_contact(self, uniform: Sequence[float], state: PlainState, c: int) -> tuple[PlainState, str]:
+        """Draw (z, f, t, γ) of a pair with six uniform numbers; return which branch was followed, too."""
         friction = float(self.pairs.friction[c])
 
         def law(x: float, kind: str) -> float:
@@ -158,70 +162,73 @@ class PlainSampler:
         against = opened.log_mass(positive=True) - normal.log_mass(positive=True)
         if friction > 0.0:
             against -= tangential.log_mass(positive=False) - tangential.level
-        assert not AMBIGUOUS[0] < against < AMBIGUOUS[1], "the case should determine this"
         was = bool(state.bearing[c]), float(state.fn[c]), float(state.ft[c])
-        bearing, fn, ft, branch = False, 0.0, 0.0, "hopeless" if against > HOPELESS else "open"
-        if against < HOPELESS and rng.random() < 1.0 / (1.0 + math.exp(against)):
+        bearing, fn, ft, branch = False, 0.0, 0.0, "hopeless" if against > CERTAIN else "open"
+        if uniform[0] < 1.0 / (1.0 + math.exp(min(against, 200.0))):
             bearing, branch = True, "frictional" if friction > 0.0 else "smooth"
-            fn = normal.draw_above(rng, 0.0)
-            ft = tangential.draw(rng) if friction > 0.0 else 0.0
+            fn = normal.draw_above(uniform[1], 0.0)
+            ft = tangential.draw(uniform[2]) if friction > 0.0 else 0.0
             if abs(ft) > friction * fn:
                 (bearing, fn, ft), branch = was, "kept bearing" if was[0] else "kept open"
         if not bearing:
-            gap = opened.draw_above(rng, 0.0)
+            gap = opened.draw_above(uniform[5], 0.0)
             return state.with_pair(c, bearing=False, fn=0.0, ft=0.0, open_gap=gap), branch
         low = 0.0
         if friction > 0.0:
-            ft = tangential.draw_between(rng, -friction * fn, friction * fn)
+            other = friction * fn * (2.0 * uniform[3] - 1.0)
+            if uniform[4] < math.exp(min(tangential.log_ratio(other, ft), 0.0)):
+                ft, branch = other, f"{branch}, moved"
             low = abs(ft) / friction
-        fn = normal.draw_above(rng, low)
+        fn = normal.draw_above(uniform[5], low)
         return state.with_pair(c, bearing=True, fn=fn, ft=ft, open_gap=0.0), branch
 
-    def draw_contacts(self, rng: np.random.Generator, state: PlainState) -> tuple[PlainState, list[str]]:
-        branches = []
-        for c in range(len(self.pairs.gap)):
-            state, branch = self.draw_contact(rng, state, c)
-            branches.append(branch)
+    def draw_block(self, uniform: Array, state: PlainState, rows: Sequence[int]) -> tuple[PlainState, list[str]]:
+        """Draw the pairs of a block (−1: absent), all of which see the state before it, with uniform (6, lanes)."""
+        before, branches = state, []
+        for lane, c in enumerate(rows):
+            if c >= 0:
+                drawn, branch = self.draw_contact(uniform[:, lane], before, c)
+                pair = (each[c] for each in (drawn.bearing, drawn.fn, drawn.ft, drawn.open_gap))
+                bearing, fn, ft, gap = pair
+                state = state.with_pair(c, bearing=bearing, fn=fn, ft=ft, open_gap=gap)
+                branches.append(branch)
         return state, branches
 
-    def draw_errors(self, rng: np.random.Generator, state: PlainState) -> PlainState:
-        """Draw radius after radius, each with the centre of its grain in all frames, from their joint Gaussian."""
+    def draw_errors(self, uniform: Sequence[float], state: PlainState, grain: int) -> PlainState:
+        """Draw a radius with the centres of its grain in all frames, from their joint Gaussian."""
         grains = self.grains
         n, frames = len(grains.radius_sd), len(grains.centre_sd) // len(grains.radius_sd)
-        for grain in range(n):
-            rows = [grain + n * k for k in range(frames)]
+        rows = [grain + n * k for k in range(frames)]
 
-            def moved(x: Array, state: PlainState = state, grain: int = grain, rows: list[int] = rows) -> float:
-                radius, centre = state.radius.copy(), state.centre.copy()
-                radius[grain], centre[rows] = x[0], x[1:].reshape(-1, 2)
-                return self.minus_log_posterior(replace(state, radius=radius, centre=centre))
-
-            precision, slope = quadratic_of(moved, 1 + 2 * frames, step=0.1)
-            covariance = np.linalg.inv(precision)
-            mean = covariance @ slope
-            delta = mean[0] + math.sqrt(covariance[0, 0]) * rng.standard_normal()
+        def moved(x: Array) -> float:
             radius, centre = state.radius.copy(), state.centre.copy()
-            radius[grain] = delta
-            for k, row in enumerate(rows):
-                part = slice(1 + 2 * k, 3 + 2 * k)
-                own = precision[part, part]
-                expected = mean[part] - np.linalg.solve(own, precision[part, 0]) * (delta - mean[0])
-                factor = np.linalg.cholesky(own)
-                centre[row] = expected + np.linalg.solve(factor.T, [rng.standard_normal(), rng.standard_normal()])
-            state = replace(state, radius=radius, centre=centre)
-        return state
+            radius[grain], centre[rows] = x[0], x[1:].reshape(-1, 2)
+            return self.minus_log_posterior(replace(state, radius=radius, centre=centre))
 
-    def draw_common(self, rng: np.random.Generator, state: PlainState) -> PlainState:
+        normal = [standard_normal(each) for each in uniform]
+        precision, slope = quadratic_of(moved, 1 + 2 * frames, step=0.1)
+        covariance = np.linalg.inv(precision)
+        mean = covariance @ slope
+        delta = mean[0] + math.sqrt(covariance[0, 0]) * normal[0]
+        radius, centre = state.radius.copy(), state.centre.copy()
+        radius[grain] = delta
+        for k, row in enumerate(rows):
+            part = slice(1 + 2 * k, 3 + 2 * k)
+            own = precision[part, part]
+            expected = mean[part] - np.linalg.solve(own, precision[part, 0]) * (delta - mean[0])
+            factor = np.linalg.cholesky(own)
+            centre[row] = expected + np.linalg.solve(factor.T, normal[part])
+        return replace(state, radius=radius, centre=centre)
+
+    def draw_common(self, uniform: Sequence[float], state: PlainState) -> PlainState:
         law = Gaussian.through(lambda x: self.minus_log_posterior(replace(state, compliance=x)), step=0.1)
-        state = replace(state, compliance=law.draw_above(rng, 0.0))
+        state = replace(state, compliance=law.draw_above(uniform[0], 0.0))
         law = Gaussian.through(lambda x: self.minus_log_posterior(replace(state, offset=x)), step=0.1)
-        return replace(state, offset=law.draw(rng))
+        return replace(state, offset=law.draw(uniform[1]))
 
-    def draw_scale(self, rng: np.random.Generator, state: PlainState) -> PlainState:
+    def draw_scale(self, uniform: Iterator[float], state: PlainState) -> PlainState:
         """Metropolis steps of the logarithm of a factor on all forces; κ f stays."""
         z = np.asarray(state.bearing, bool)
-        if not z.any():
-            return state
         drawn = z.sum() + (z & (self.pairs.friction > 0.0)).sum() - 1
 
         def level(log_x: float) -> float:
@@ -229,15 +236,11 @@ class PlainSampler:
 
         now, current = 0.0, level(0.0)
         for _ in range(SCALE_STEPS):
-            trial = now + rng.standard_normal() / math.sqrt(abs(drawn) + 1.0)
+            trial = now + standard_normal(next(uniform)) / math.sqrt(abs(drawn) + 1.0)
             tried = level(trial)
-            if rng.random() < math.exp(min(tried - current, 0.0)):
+            if next(uniform) < math.exp(min(tried - current, 0.0)):
                 now, current = trial, tried
         return state.scaled(math.exp(now))
-
-    def sweep(self, rng: np.random.Generator, state: PlainState) -> PlainState:
-        state, _ = self.draw_contacts(rng, state)
-        return self.draw_scale(rng, self.draw_common(rng, self.draw_errors(rng, state)))
 
 
 def quadratic_of(minus_log: Callable[[Array], float], count: int, step: float) -> tuple[Array, Array]:

@@ -1,0 +1,171 @@
+"""Elementary functions and uniform random numbers for many contacts at a time, in single precision.
+
+Loops over LANES numbers that call these functions become vector instructions, because nothing in them branches; the
+mathematical library's functions would be called number by number. Draws need no more digits than random numbers have.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from ...vectors import llvm_implementation_of
+
+LANES = 16  # numbers of single precision in the widest registers
+ZERO, HALF, ONE, TWO = (np.float32(x) for x in (0.0, 0.5, 1.0, 2.0))
+GREATEST_EXPONENT, LEAST_EXPONENT = np.float32(88.0), np.float32(-87.0)  # beyond which exp leaves single precision
+ROOT_HALF_BITS = 0x3F3504F3  # of √½, the least mantissa
+MANTISSA_BITS, EXPONENT_BIAS = 23, 127
+ROUNDING = np.float32(1.5 * 2.0**23)  # added and subtracted, it leaves an integer
+LOG2_E = np.float32(1.0 / math.log(2.0))
+# ln 2 in two parts: the first is short, so that its products with integers are exact.
+LN2_HIGH, LN2_LOW = np.float32(355.0 / 512.0), np.float32(math.log(2.0) - 355.0 / 512.0)
+E2, E3, E4, E5, E6 = (np.float32(1.0 / math.factorial(k)) for k in range(2, 7))  # Taylor: 2e-8 up to ½ ln 2
+# Coefficients of (ln(1 + t) − t + t²/2)/t³, fitted at Chebyshev points of √½ − 1 … √2 − 1: 5e-8 of the logarithm.
+C0, C1, C2, C3, C4, C5, C6 = (
+    np.float32(x)
+    for x in (0.333334103, -0.250009217, 0.199851278, -0.165928563, 0.146763966, -0.141184249, 0.0927221424)
+)
+
+_INTEGER, _SINGLE = ir.IntType(32), ir.FloatType()
+_INTEGERS, _SINGLES = ir.VectorType(_INTEGER, LANES), ir.VectorType(_SINGLE, LANES)
+_PLACE = ir.IntType(64)
+
+
+@intrinsic
+def _exponent_of(typing_context, x):  # type: ignore[no-untyped-def]
+    """k of x = 2^k (1 + t), √½ ≤ 1 + t < √2."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        return builder.sitofp(_exponent_bits(builder, builder.bitcast(arguments[0], _INTEGER)), _SINGLE)
+
+    return types.float32(types.float32), generate
+
+
+@intrinsic
+def _mantissa_of(typing_context, x):  # type: ignore[no-untyped-def]
+    """1 + t of the same."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        bits = builder.bitcast(arguments[0], _INTEGER)
+        shifted = builder.shl(_exponent_bits(builder, bits), _INTEGER(MANTISSA_BITS))
+        return builder.bitcast(builder.sub(bits, shifted), _SINGLE)
+
+    return types.float32(types.float32), generate
+
+
+@intrinsic
+def _power_of_two(typing_context, k):  # type: ignore[no-untyped-def]
+    """2^k of an integer k."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        biased = builder.add(builder.fptosi(arguments[0], _INTEGER), _INTEGER(EXPONENT_BIAS))
+        return builder.bitcast(builder.shl(biased, _INTEGER(MANTISSA_BITS)), _SINGLE)
+
+    return types.float32(types.float32), generate
+
+
+def _exponent_bits(builder, bits):  # type: ignore[no-untyped-def]
+    return builder.ashr(builder.sub(bits, _INTEGER(ROOT_HALF_BITS)), _INTEGER(MANTISSA_BITS))
+
+
+@njit(forceinline=True, error_model="numpy", fastmath={"contract"})
+def exponential(x):  # type: ignore[no-untyped-def]
+    """Compute e^x, between e^−87 and e^88, to a relative error of 2e-7."""
+    x = min(max(x, LEAST_EXPONENT), GREATEST_EXPONENT)
+    k = (x * LOG2_E + ROUNDING) - ROUNDING
+    r = (x - k * LN2_HIGH) - k * LN2_LOW
+    return (ONE + r * (ONE + r * (E2 + r * (E3 + r * (E4 + r * (E5 + r * E6)))))) * _power_of_two(k)
+
+
+@njit(forceinline=True, error_model="numpy", fastmath={"contract"})
+def logarithm(x):  # type: ignore[no-untyped-def]
+    """Compute ln x of a positive normal number, to an error of 2e-7 or its rounding."""
+    k, t = _exponent_of(x), _mantissa_of(x) - ONE
+    square = t * t
+    rest = t * square * (C0 + t * (C1 + t * (C2 + t * (C3 + t * (C4 + t * (C5 + t * C6))))))
+    return k * LN2_HIGH + (t + (k * LN2_LOW + (rest - HALF * square)))
+
+
+@njit(inline="always")
+def numbers(size):  # type: ignore[no-untyped-def]
+    """Allocate double-precision numbers aligned to a cache line; inlined, so that the compiler rules out aliasing."""
+    buffer = np.empty(size + 8)
+    start = (-(buffer.ctypes.data >> 3)) & 7
+    return buffer[start : start + size]
+
+
+@njit(inline="always")
+def singles(size):  # type: ignore[no-untyped-def]
+    """Allocate single-precision numbers in the same way."""
+    buffer = np.empty(size + 16, np.float32)
+    start = (-(buffer.ctypes.data >> 2)) & 15
+    return buffer[start : start + size]
+
+
+def seed_lanes(rng: np.random.Generator) -> NDArray[np.uint32]:
+    """Draw the state (4 · LANES,) of one generator in each lane."""
+    return rng.integers(1, 2**32, size=4 * LANES, dtype=np.uint32)
+
+
+def draw_uniform(random, out, first):  # type: ignore[no-untyped-def]
+    """Draw LANES numbers of single precision, uniform in (0, 1), to out[first:]; random (4 · LANES,) changes.
+
+    Notes
+    -----
+    Every lane is a generator xoshiro128++ (Blackman and Vigna 2021); its upper 24 bits k are the number (k + ½)/2²⁴.
+    """
+    for lane in range(LANES):
+        a, b, c, d = (int(random[q * LANES + lane]) for q in range(4))
+        number = (_rotated((a + d) & 0xFFFFFFFF, 7) + a) & 0xFFFFFFFF
+        out[first + lane] = np.float32((number >> 8) * 2.0**-24) + np.float32(2.0**-25)
+        shifted = (b << 9) & 0xFFFFFFFF
+        c ^= a
+        d ^= b
+        b ^= c
+        a ^= d
+        c ^= shifted
+        for q, word in enumerate((a, b, c, _rotated(d, 11))):
+            random[q * LANES + lane] = word
+
+
+def _rotated(word: int, bits: int) -> int:
+    return ((word << bits) | (word >> (32 - bits))) & 0xFFFFFFFF
+
+
+@llvm_implementation_of(draw_uniform)
+def _draw_uniform(builder, kinds, values):  # type: ignore[no-untyped-def]
+    random, out, first = values
+
+    def row(q):  # type: ignore[no-untyped-def]
+        return builder.bitcast(builder.gep(random, [_PLACE(q * LANES)]), _INTEGERS.as_pointer())
+
+    def rotated(words, bits):  # type: ignore[no-untyped-def]
+        return builder.or_(builder.shl(words, _equal(bits)), builder.lshr(words, _equal(32 - bits)))
+
+    a, b, c, d = (builder.load(row(q)) for q in range(4))
+    for word in (a, b, c, d):
+        word.align = 4
+    number = builder.add(rotated(builder.add(a, d), 7), a)
+    shifted = builder.shl(b, _equal(9))
+    c, d = builder.xor(c, a), builder.xor(d, b)
+    b, a = builder.xor(b, c), builder.xor(a, d)
+    c, d = builder.xor(c, shifted), rotated(d, 11)
+    for q, word in enumerate((a, b, c, d)):
+        builder.store(word, row(q)).align = 4
+    upper = builder.uitofp(builder.lshr(number, _equal(8)), _SINGLES)
+    drawn = builder.fadd(builder.fmul(upper, _all(2.0**-24)), _all(2.0**-25))
+    builder.store(drawn, builder.bitcast(builder.gep(out, [first]), _SINGLES.as_pointer())).align = 4
+
+
+def _equal(word: int) -> ir.Constant:
+    return ir.Constant(_INTEGERS, [word] * LANES)
+
+
+def _all(number: float) -> ir.Constant:
+    return ir.Constant(_SINGLES, [number] * LANES)
