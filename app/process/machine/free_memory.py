@@ -21,7 +21,7 @@ def return_large_blocks() -> None:
     A recording of 1000 photographs of 250 rods takes 15 MB less, and 4 MB less after it was solved in the same process.
     Tracking photographs takes 4 % longer.
     """
-    global _returning  # noqa: PLW0603 the C library has one setting, too
+    global _returning
     _returning = True
     _set(RETURNED)
 

@@ -98,7 +98,14 @@ def draw_contacts(chain, model):  # type: ignore[no-untyped-def]
     """
     blocks, state, workspace = chain.pairs, chain.state, chain.workspace
     ids, value, group = blocks.body.reshape(blocks.body.size), blocks.value.reshape(blocks.value.size), blocks.group
-    grouped, z, fn, ft, open_gap, random = blocks.grouped, state.bearing, state.fn, state.ft, state.open_gap, state.random
+    grouped, z, fn, ft, open_gap, random = (
+        blocks.grouped,
+        state.bearing,
+        state.fn,
+        state.ft,
+        state.open_gap,
+        state.random,
+    )
     body, group_sum, group_load = state.force.reshape(state.force.size), state.group_sum, workspace.group_load
     height, residual, weights = workspace.height, workspace.residual, workspace.precision
     kappa, offset, excess, count = state.common

@@ -128,7 +128,9 @@ def draw_errors(chain):  # type: ignore[no-untyped-def]
             for k in range(L):
                 delta = work[7 * L + k]
                 x = mean[u + k] - delta * factor[f + 3 * L + k] + np.float64(uniform[k])
-                y = (mean[u + L + k] - delta * factor[f + 4 * L + k] + np.float64(uniform[L + k])) * factor[f + 2 * L + k]
+                y = (mean[u + L + k] - delta * factor[f + 4 * L + k] + np.float64(uniform[L + k])) * factor[
+                    f + 2 * L + k
+                ]
                 work[CX * L + k], work[CY * L + k] = (x - factor[f + L + k] * y) * factor[f + k], y
                 work[DELTA * L + k], work[3 * L + k] = delta, 0.0
             for k in range(0, L, WIDTH):

@@ -10,12 +10,9 @@ from numpy.typing import NDArray
 from ...bodies.grains import Array
 from .blocks import (
     GAP,
-    PRESENT,
-    PRIOR,
     RECORD,
     GrainBlocks,
     PairBlocks,
-    Rows,
     make_grain_blocks,
     make_pair_blocks,
 )
@@ -28,14 +25,14 @@ CX, CY, DELTA, _NOTHING = range(RECORD)
 
 
 class SamplerState(NamedTuple):
-    """One draw of all unknowns; changes in place. p places of pairs; m grains, an absent one, and more up to a block."""
+    """One draw of all unknowns; changes in place. p places of pairs; r records of the grains, with absent ones."""
 
     bearing: Array  # (p,) z, 1 or 0
     fn: Array  # (p,) f
     ft: Array  # (p,) t
     open_gap: Array  # (p,) γ
-    force: Array  # (blocks of grains × LANES, 4) records of the sums on each grain, of which the absent one has none
-    error: Array  # (blocks of grains × LANES, 4) records of the errors of each grain
+    force: Array  # (r, 4) sums of forces on each grain
+    error: Array  # (r, 4) errors of each grain, 0 of absent ones
     group_sum: Array  # (g,) Σ f of each group
     common: Array  # (4,) κ, offset, Σ_bearing (f − 1), Σ z
     random: NDArray[np.uint32]  # (4 LANES,) generators of random numbers
@@ -48,7 +45,7 @@ class Workspace(NamedTuple):
     residual: Array  # (p,) at ε = δ = 0: gap − offset + κ f, or gap − offset − γ
     precision: Array  # (p,) 1/b²
     group_load: Array  # (g,)
-    grain: Array  # (blocks of grains × LANES, 5) weight (2), of the balance, measured pressure, its inverse variance
+    grain: Array  # (r, 5) weight (2), of the balance, measured pressure, its inverse variance
     pair_weight: Array  # (rows of pairs, LANES) 1/b², in the order of `GrainBlocks.pair`
     centre_factor: Array  # (blocks of grains × frames, 5, LANES) factor of the precision of ε
     radius_precision: Array  # (blocks of grains, LANES) of δ
@@ -65,9 +62,7 @@ class Chain(NamedTuple):
     size: int  # of grains, m
 
 
-def start_chain(
-    pairs: SamplerPairs, grains: SamplerGrains, compliance: float, rng: np.random.Generator
-) -> Chain:
+def start_chain(pairs: SamplerPairs, grains: SamplerGrains, compliance: float, rng: np.random.Generator) -> Chain:
     """Arrange pairs and grains in blocks, with a state without errors: the nearest Σ P pairs bear one unit of force."""
     blocks = make_pair_blocks(pairs, grains)
     state = _initial_state(pairs, grains, blocks, compliance, rng)

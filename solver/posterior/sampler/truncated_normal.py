@@ -28,8 +28,9 @@ DENSITY = np.float32(1.0 / ROOT_TWO_PI)  # of the normal distribution at 0
 FAR = np.float32(6.0)  # standard deviations: a draw above such a bound nearly follows an exponential distribution
 LEAST_TAIL = np.float32(2.0**-24)
 LOG_4 = np.float32(math.log(4.0))
-# x of a tail p = Q(x) is (1 − 2p) times a function of w = −ln(4 p (1 − p)): a polynomial in w up to JOINT, in √w beyond,
-# up to the tail at FAR times the least uniform number. Both variables are scaled to −1 … 1; fitted at Chebyshev points.
+# x of a tail p = Q(x) is (1 − 2p) times a function of w = −ln(4 p (1 − p)): a polynomial in w up to JOINT, and in √w
+# beyond, down to the tail at FAR times the least uniform number. Both variables are scaled to −1 … 1; fitted at
+# Chebyshev points.
 JOINT = np.float32(5.0)
 W_MIDDLE, W_SCALE = np.float32(2.5), np.float32(0.4)
 A0, A1, A2, A3, A4, A5, A6, A7 = (
