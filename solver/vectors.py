@@ -19,23 +19,23 @@ _LANE = ir.IntType(32)
 _FUSED = ("contract",)  # allows fused multiply-add
 
 
-def llvm_implementation_of(plain: Callable) -> Callable:
-    """Register the decorated function as the LLVM implementation of a plain function without return value.
+def llvm_implementation_of(plain: Callable, returned: types.Type = types.void) -> Callable:
+    """Register the decorated function as the LLVM implementation of a plain function, by default without return value.
 
     The decorated function receives the LLVM builder, the types of the arguments and their values; arrays are passed as
-    pointers to their first number.
+    pointers to their first number. It returns the value of the type `returned`.
     """
 
     def register(generate):  # type: ignore[no-untyped-def]
-        def returns_nothing(*arguments):  # type: ignore[no-untyped-def]
-            return types.void
+        def typed(*arguments):  # type: ignore[no-untyped-def]
+            return returned
 
-        returns_nothing.__signature__ = signature(plain)  # type: ignore[attr-defined]
-        type_callable(plain)(lambda context: returns_nothing)
+        typed.__signature__ = signature(plain)  # type: ignore[attr-defined]
+        type_callable(plain)(lambda context: typed)
 
         def lower(context, builder, call, values):  # type: ignore[no-untyped-def]
-            generate(builder, call.args, _pointers(context, builder, call.args, values))
-            return context.get_dummy_value()
+            value = generate(builder, call.args, _pointers(context, builder, call.args, values))
+            return context.get_dummy_value() if returned is types.void else value
 
         lower_builtin(plain, types.VarArg(types.Any))(lower)
         return generate

@@ -35,7 +35,7 @@ from .truncated_normal import distance_above, normal_of, scaled_log_tail
 
 L = LANES
 DRAWS = 6  # uniform numbers of a pair: z, f, t, another t and whether it is taken, f or γ
-UNBOUND = np.float32(1e30)  # μ over the ratio of both standard deviations, where there is no tangential force
+UNBOUND = np.float32(1e15)  # μ over the ratio of both standard deviations, where there is no tangential force
 # Rows of a block between its parts, in single precision.
 X, Y, MEAN_T, LOG_ODDS, ODDS, CONE, OLD_F, OLD_T, OLD_Z, NEW_Z, DISTANCE, NEW_T, SINGLES = range(13)
 

@@ -11,7 +11,6 @@ import math
 import numpy as np
 from llvmlite import ir
 from numba import njit, types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from ...vectors import llvm_implementation_of
@@ -37,37 +36,39 @@ _INTEGERS, _SINGLES = ir.VectorType(_INTEGER, LANES), ir.VectorType(_SINGLE, LAN
 _PLACE = ir.IntType(64)
 
 
-@intrinsic
-def _exponent_of(typing_context, x):  # type: ignore[no-untyped-def]
-    """k of x = 2^k (1 + t), √½ ≤ 1 + t < √2."""
-
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        return builder.sitofp(_exponent_bits(builder, builder.bitcast(arguments[0], _INTEGER)), _SINGLE)
-
-    return types.float32(types.float32), generate
+def exponent_of(x):  # type: ignore[no-untyped-def]
+    """Return k of x = 2^k (1 + t), √½ ≤ 1 + t < √2, of a positive normal number."""
+    fraction, exponent = math.frexp(x)
+    return np.float32(exponent if fraction >= math.sqrt(0.5) else exponent - 1)
 
 
-@intrinsic
-def _mantissa_of(typing_context, x):  # type: ignore[no-untyped-def]
-    """1 + t of the same."""
-
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        bits = builder.bitcast(arguments[0], _INTEGER)
-        shifted = builder.shl(_exponent_bits(builder, bits), _INTEGER(MANTISSA_BITS))
-        return builder.bitcast(builder.sub(bits, shifted), _SINGLE)
-
-    return types.float32(types.float32), generate
+def mantissa_of(x):  # type: ignore[no-untyped-def]
+    """Return 1 + t of the same."""
+    fraction, _ = math.frexp(x)
+    return np.float32(fraction if fraction >= math.sqrt(0.5) else 2.0 * fraction)
 
 
-@intrinsic
-def _power_of_two(typing_context, k):  # type: ignore[no-untyped-def]
-    """2^k of an integer k."""
+def power_of_two(k):  # type: ignore[no-untyped-def]
+    """Return 2^k of an integer k."""
+    return np.float32(2.0 ** float(k))
 
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        biased = builder.add(builder.fptosi(arguments[0], _INTEGER), _INTEGER(EXPONENT_BIAS))
-        return builder.bitcast(builder.shl(biased, _INTEGER(MANTISSA_BITS)), _SINGLE)
 
-    return types.float32(types.float32), generate
+@llvm_implementation_of(exponent_of, types.float32)
+def _exponent_of(builder, kinds, values):  # type: ignore[no-untyped-def]
+    return builder.sitofp(_exponent_bits(builder, builder.bitcast(values[0], _INTEGER)), _SINGLE)
+
+
+@llvm_implementation_of(mantissa_of, types.float32)
+def _mantissa_of(builder, kinds, values):  # type: ignore[no-untyped-def]
+    bits = builder.bitcast(values[0], _INTEGER)
+    shifted = builder.shl(_exponent_bits(builder, bits), _INTEGER(MANTISSA_BITS))
+    return builder.bitcast(builder.sub(bits, shifted), _SINGLE)
+
+
+@llvm_implementation_of(power_of_two, types.float32)
+def _power_of_two(builder, kinds, values):  # type: ignore[no-untyped-def]
+    biased = builder.add(builder.fptosi(values[0], _INTEGER), _INTEGER(EXPONENT_BIAS))
+    return builder.bitcast(builder.shl(biased, _INTEGER(MANTISSA_BITS)), _SINGLE)
 
 
 def _exponent_bits(builder, bits):  # type: ignore[no-untyped-def]
@@ -80,13 +81,13 @@ def exponential(x):  # type: ignore[no-untyped-def]
     x = min(max(x, LEAST_EXPONENT), GREATEST_EXPONENT)
     k = (x * LOG2_E + ROUNDING) - ROUNDING
     r = (x - k * LN2_HIGH) - k * LN2_LOW
-    return (ONE + r * (ONE + r * (E2 + r * (E3 + r * (E4 + r * (E5 + r * E6)))))) * _power_of_two(k)
+    return (ONE + r * (ONE + r * (E2 + r * (E3 + r * (E4 + r * (E5 + r * E6)))))) * power_of_two(k)
 
 
 @njit(forceinline=True, error_model="numpy", fastmath={"contract"})
 def logarithm(x):  # type: ignore[no-untyped-def]
     """Compute ln x of a positive normal number, to an error of 2e-7 or its rounding."""
-    k, t = _exponent_of(x), _mantissa_of(x) - ONE
+    k, t = exponent_of(x), mantissa_of(x) - ONE
     square = t * t
     rest = t * square * (C0 + t * (C1 + t * (C2 + t * (C3 + t * (C4 + t * (C5 + t * C6))))))
     return k * LN2_HIGH + (t + (k * LN2_LOW + (rest - HALF * square)))
