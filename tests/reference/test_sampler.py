@@ -51,7 +51,7 @@ def make_case(*, scale_known: bool, soft: bool) -> Case:
     rng, m = np.random.default_rng(8), RADII * FRAMES
     first, second = [], []
     for k in range(FRAMES):
-        for i, j in ((0, 1), (1, 2), (2, 3), (0, 3), (0, 2), (1, 3), (0, -1), (1, -1), (2, -1), (3, -1), (3, -1)):
+        for i, j in ((0, 1), (1, 2), (2, 3), (0, 3), (2, -1), (1, 3), (0, -1), (1, -1), (2, -1), (3, -1), (3, -1)):
             first.append(i + RADII * k)
             second.append(j + RADII * k if j >= 0 else -1)
     i, j = np.array(first), np.array(second)
@@ -68,7 +68,7 @@ def make_case(*, scale_known: bool, soft: bool) -> Case:
         group[[7, 9]], group[[18, 20]] = 0, 1
     pairs = SamplerPairs(
         i, j, np.column_stack([np.cos(angle), np.sin(angle)]), gap, odds, friction, group,
-        np.where(np.arange(c) % 5 == 0, 0.015, 0.0), np.where(np.arange(c) == 9, 0.7, 1.0),
+        np.where(np.arange(c) % 5 == 0, 0.015, 0.0), np.where(np.arange(c) % 13 == 7, 0.7, 1.0),
     )  # fmt: skip
     balance_weight = np.ones(m)
     balance_weight[[2, 5]] = 0.0, 0.01
