@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment
 from rodsight.process.progress import no_progress
+from rodsight.solver.assessment.fitted import FITTED
 from rodsight.solver.assessment.mixture_trust import WEIGHT_TERMS, motion_reliability
 from rodsight.solver.mixture.position_estimates import PositionEstimates
 from rodsight.study.scenarios.mixture_fit import ALONE, WEIGHTS, MixtureSample, fit_weight, mixed_forces
@@ -32,6 +33,18 @@ def test_the_fitted_weight_is_the_best_one_on_frames_that_were_not_fitted() -> N
     np.testing.assert_allclose(expit(other.terms @ coefficients), best, atol=0.15)
     assert (other.r.max(axis=1) - other.reached(expit(other.terms @ coefficients))).mean() < 0.002
     assert (other.r.max(axis=1) - other.reached(np.full(COUNT, best.mean()))).mean() > 0.01
+
+
+def test_a_fit_takes_little_from_a_kind_that_the_present_weights_serve_best() -> None:
+    rng, table = np.random.default_rng(3), FITTED["position_weight"]
+    present = np.array([table[name] for name in WEIGHT_TERMS])
+    terms = rng.normal(0.0, 0.01, (COUNT, len(present)))
+    terms[:, 0], terms[:, 1] = 1.0, terms[:, 1] - present[0] / present[1]  # present weights of about one half
+    kind = np.array(["shear", "biaxial", "gravity"])[np.arange(COUNT) % 3]
+    best = np.where(kind == "shear", expit(terms @ present), 1.0)
+    r = 0.97 - 0.2 * (WEIGHTS - best[:, None]) ** 2
+    weight = expit(terms @ fit_weight(MixtureSample(kind, terms, r, np.zeros(COUNT))))
+    assert 0.55 < weight.mean() < 0.7  # 5/6 if every kind counted the same
 
 
 @pytest.mark.slow

@@ -112,6 +112,7 @@ MUTANTS = [
         "solver/assessment/penalties.py",
         PENALTIES,
         ("if not each.counted:", "if each.counted:"),
+        ("(frame.trust_penalties, words)", "(words, frame.trust_penalties)"),
         ("check.measured, 1.0 / COVERAGE_FACTOR)", "check.measured, 1.0)"),
         ("BEYOND_WALL_LOSS * beyond / max(evidence.grains, 1)", "BEYOND_WALL_LOSS * beyond / 100.0"),
         ("check.measured, 1.0 - frame.position_weight\n", "check.measured, 1.0\n"),

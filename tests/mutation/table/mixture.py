@@ -68,6 +68,7 @@ MUTANTS = [
         "tests/app/study/test_mixture_fit.py",
         ("best - r + PRICE", "r - best + PRICE"),
         ("found[0] -= found[1:] @ middle[1:]", "found[0] -= 0.0"),
+        ("+ PRICE_NEW * float(worse.mean())", "+ 0.0 * float(worse.mean())"),
     ),
     *mutants_of(
         "solver/mixture/soft_grains.py",
