@@ -100,7 +100,7 @@ def greatest_part(request, monkeypatch) -> float:
 
 
 def plain_of(chain: Chain) -> PlainState:
-    state, place, m = chain.state, chain.pairs.place, chain.size
+    state, place, m = chain.state, chain.pairs.place, chain.grain_count
     return PlainState(
         state.bearing[place] > 0.0, state.fn[place], state.ft[place], state.open_gap[place],
         state.error[:m, CX : CY + 1].copy(), state.error[:RADII, DELTA].copy(),
@@ -110,7 +110,7 @@ def plain_of(chain: Chain) -> PlainState:
 
 def assert_same(case: Case, chain: Chain, plain: PlainState) -> None:
     """All unknowns are equal, and the sums that the kernels update are those of the forces."""
-    found, state, m = plain_of(chain), chain.state, chain.size
+    found, state, m = plain_of(chain), chain.state, chain.grain_count
     np.testing.assert_array_equal(found.bearing, plain.bearing)
     for name in ("fn", "ft", "open_gap"):
         np.testing.assert_allclose(getattr(found, name), getattr(plain, name), rtol=DRAWN, atol=DRAWN)
@@ -124,7 +124,7 @@ def assert_same(case: Case, chain: Chain, plain: PlainState) -> None:
 
 def assert_sums(case: Case, chain: Chain) -> None:
     """The sums that the kernels update are those of the forces, and absent pairs and grains have none."""
-    found, state, m = plain_of(chain), chain.state, chain.size
+    found, state, m = plain_of(chain), chain.state, chain.grain_count
     z = found.bearing
     assert state.common[2:] == pytest.approx([(found.fn[z] - 1.0).sum(), z.sum()], abs=ROUNDING)
     sums = resultants(case.pairs, case.grains, found.fn, found.ft)
@@ -155,7 +155,7 @@ def uniform_rows(random: Array, rows: int) -> Array:
 def sampled_chain(case: Case, sweeps: int = 3) -> Chain:
     """A chain some sweeps after the start, with errors of all kinds."""
     chain = case.start()
-    sums = np.zeros((len(chain.state.fn), 5)), np.zeros((chain.size, 6)), np.zeros(4)
+    sums = np.zeros((len(chain.state.fn), 5)), np.zeros((chain.grain_count, 6)), np.zeros(4)
     run(chain, np.tile(np.array(case.model), (sweeps, 1)), 1, sums)
     return chain
 
@@ -164,7 +164,7 @@ def plain_contacts(case: Case, chain: Chain, random: Array) -> tuple[PlainState,
     """Draw the pairs by the plain sampler, block by block; return branches and pairs, too."""
     state, branches, drawn = plain_of(chain), [], []
     row = np.full(len(chain.state.fn), -1)
-    row[chain.pairs.place] = np.arange(chain.count)
+    row[chain.pairs.place] = np.arange(chain.pair_count)
     for rows in row.reshape(-1, LANES):
         state, found = case.plain.draw_block(uniform_rows(random, DRAWS), state, rows.tolist())
         branches += found
@@ -177,7 +177,7 @@ def plain_errors(case: Case, chain: Chain, random: Array, state: PlainState) -> 
     for block, radii in enumerate(grains.record[:: grains.frames] // blocks.RECORD):
         uniform = uniform_rows(random, 1 + 2 * grains.frames)
         for lane, grain in enumerate(radii.tolist()):
-            if grain < chain.size:
+            if grain < chain.grain_count:
                 state = case.plain.draw_errors(uniform[:, lane].tolist(), state, grain)
         assert block < len(grains.radius_precision)
     return state
@@ -186,7 +186,7 @@ def plain_errors(case: Case, chain: Chain, random: Array, state: PlainState) -> 
 @pytest.mark.thorough
 def test_forces_bearing_and_gaps_have_the_plain_conditional_distributions(case, greatest_part):
     chain, branches = case.start(), []
-    assert (chain.count > len(chain.pairs.grouped)) == (greatest_part > 0.1)
+    assert (chain.pair_count > len(chain.pairs.grouped)) == (greatest_part > 0.1)
     for _ in range(SWEEPS):
         plain, followed, drawn = plain_contacts(case, chain, chain.state.random.copy())
         draw_contacts(chain, case.model)
@@ -270,9 +270,9 @@ def test_sweeps_follow_the_schedule_and_only_the_last_are_summed(case):
     looser = case.model._replace(balance_sd=0.9, gap_law_sd=0.05)
     models, kept = [looser, looser, case.model, case.model, case.model], 2
     chain, single = case.start(seed=4), case.start(seed=4)
-    sums = np.zeros((len(chain.state.fn), 5)), np.zeros((chain.size, 6)), np.zeros(4)
+    sums = np.zeros((len(chain.state.fn), 5)), np.zeros((chain.grain_count, 6)), np.zeros(4)
     run(chain, np.array(models), kept, sums)
-    pair, error, common = np.zeros((chain.count, 5)), np.zeros((chain.size, 6)), np.zeros(4)
+    pair, error, common = np.zeros((chain.pair_count, 5)), np.zeros((chain.grain_count, 6)), np.zeros(4)
     for k, model in enumerate(models):
         weigh_pairs(single, model)
         factorize_errors(single)
@@ -284,7 +284,7 @@ def test_sweeps_follow_the_schedule_and_only_the_last_are_summed(case):
             plain = plain_of(single)
             pair += np.column_stack([plain.bearing, plain.fn, plain.ft, plain.fn**2, plain.ft**2])
             radius = np.tile(plain.radius, FRAMES)
-            pressure = normal_sums(case.pairs, plain.fn, chain.size)
+            pressure = normal_sums(case.pairs, plain.fn, chain.grain_count)
             error += np.column_stack([plain.centre, radius, radius**2, pressure, pressure**2])
             common += [plain.compliance, plain.compliance**2, plain.offset, plain.offset**2]
     for found, expected in zip((sums[0][chain.pairs.place], *sums[1:]), (pair, error, common), strict=True):
@@ -293,10 +293,10 @@ def test_sweeps_follow_the_schedule_and_only_the_last_are_summed(case):
 
 
 def test_blocks_share_no_grain_no_known_sum_and_no_pair(case, greatest_part):
-    chain, pairs, m = case.start(), case.pairs, case.start().size
+    chain, pairs, m = case.start(), case.pairs, case.start().grain_count
     row = np.full(len(chain.state.fn), -1)
-    row[chain.pairs.place] = np.arange(chain.count)
-    assert sorted(row[row >= 0]) == list(range(chain.count))
+    row[chain.pairs.place] = np.arange(chain.pair_count)
+    assert sorted(row[row >= 0]) == list(range(chain.pair_count))
     largest = 0
     for rows in row.reshape(-1, LANES):
         present = rows[rows >= 0]

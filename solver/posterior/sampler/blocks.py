@@ -83,7 +83,7 @@ def make_pair_blocks(pairs: SamplerPairs, grains: SamplerGrains) -> PairBlocks:
         place,
         np.stack([(RECORD * each).reshape(blocks, LANES) for each in (i, j)], axis=1).astype(np.uint32),
         group,
-        (group >= 0).reshape(blocks, LANES).any(axis=1),
+        np.any((group >= 0).reshape(blocks, LANES), axis=1),
         np.ascontiguousarray(value.reshape(ROWS, blocks, LANES).transpose(1, 0, 2)),
     )
 

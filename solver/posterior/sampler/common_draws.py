@@ -101,7 +101,7 @@ def draw_scale(chain, model):  # type: ignore[no-untyped-def]
     if total == 0.0:
         return
     draw_uniform(state.random, uniform, 0)
-    gauge, count = model.mean_gauge / chain.count, common[3]
+    gauge, count = model.mean_gauge / chain.pair_count, common[3]
     step, log_scale, now = 1.0 / math.sqrt(abs(exponent) + 1.0), 0.0, 0.0
     for k in range(SCALE_STEPS + 1):
         trial = log_scale + step * np.float64(normal_of(logarithm(uniform[2 * k]))) if k > 0 else 0.0

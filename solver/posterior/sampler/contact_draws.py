@@ -50,7 +50,7 @@ def weigh_pairs(chain, model):  # type: ignore[no-untyped-def]
     """
     value, grouped, group = chain.pairs.value.reshape(chain.pairs.value.size), chain.pairs.grouped, chain.pairs.group
     weights, gap_law = chain.workspace.precision, model.gap_law_sd * model.gap_law_sd
-    w, tangential, gauge = 1.0 / model.balance_sd**2, 1.0 / model.tangential_sd**2, model.mean_gauge / chain.count
+    w, tangential, gauge = 1.0 / model.balance_sd**2, 1.0 / model.tangential_sd**2, model.mean_gauge / chain.pair_count
     for block in range(len(grouped)):
         p, first = block * ROWS * L, block * L
         for k in range(L):
@@ -110,7 +110,7 @@ def draw_contacts(chain, model):  # type: ignore[no-untyped-def]
     height, residual, weights = workspace.height, workspace.residual, workspace.precision
     kappa, offset, excess, count = state.common
     w, open_rate, tangential_sd = 1.0 / model.balance_sd**2, 1.0 / model.mean_open_gap, model.tangential_sd
-    mean_gauge, count_gauge = model.mean_gauge / chain.count, model.count_gauge / chain.count
+    mean_gauge, count_gauge = model.mean_gauge / chain.pair_count, model.count_gauge / chain.pair_count
     # Rows: ΣF, ΣM, Σ f of the grains i and j; slope of a known sum; 1/√A; 1/√A_t; change of f; changes of e and N.
     work, uniform, single = numbers(14 * L), singles(DRAWS * L), singles(SINGLES * L)
     for block in range(len(grouped)):
@@ -144,20 +144,24 @@ def draw_contacts(chain, model):  # type: ignore[no-untyped-def]
             b -= value[p + PRESSURE_WEIGHT_J * L + k] * (work[7 * L + k] - old_fn - value[p + PRESSURE_J * L + k])
             h, precision, gap_sd = height[c] - offset, weights[c], value[p + GAP_SD * L + k]
             b -= kappa * h * precision + mean_gauge * (other_excess - 1.0) + model.force_rate + work[8 * L + k]
-            fn_sd = 1.0 / math.sqrt(value[p + NORMAL_PRECISION * L + k] + kappa * kappa * precision)
-            friction, root_t = value[p + FRICTION * L + k], value[p + ROOT_T * L + k]
+            root_n = math.sqrt(value[p + NORMAL_PRECISION * L + k] + kappa * kappa * precision)
+            friction, root_t, fn_sd = value[p + FRICTION * L + k], value[p + ROOT_T * L + k], 1.0 / root_n
             ft_sd = 1.0 / root_t if friction > 0.0 else 0.0
             ratio = gap_sd * open_rate
-            x, y, mean_t = b * fn_sd, h / gap_sd - ratio, bt * ft_sd
+            x, y, mean_t = b * fn_sd, h * gap_sd * precision - ratio, bt * ft_sd
             log_odds = count_gauge * (other_count - model.expected_count + 0.5) - value[p + PRIOR * L + k]
             log_odds += 0.5 * mean_gauge * (1.0 - 2.0 * other_excess) - 0.5 * mean_t * mean_t
             log_odds -= 0.5 * x * x if x > 0.0 else 0.0
             log_odds += 0.5 * y * y if y > 0.0 else 0.0
             single[X * L + k], single[Y * L + k], single[MEAN_T * L + k] = x, y, mean_t
             single[LOG_ODDS * L + k] = log_odds
-            single[ODDS * L + k] = ratio / fn_sd * (root_t * tangential_sd if friction > 0.0 else 1.0)
+            single[ODDS * L + k] = ratio * root_n * (root_t * tangential_sd if friction > 0.0 else 1.0)
             single[CONE * L + k] = friction * fn_sd * root_t if friction > 0.0 else UNBOUND
-            single[OLD_F * L + k], single[OLD_T * L + k], single[OLD_Z * L + k] = old_fn / fn_sd, old_ft * root_t, old_z
+            single[OLD_F * L + k], single[OLD_T * L + k], single[OLD_Z * L + k] = (
+                old_fn * root_n,
+                old_ft * root_t,
+                old_z,
+            )
             work[9 * L + k], work[10 * L + k] = fn_sd, ft_sd
         _draw_block(single, uniform)
         for k in range(L):

@@ -136,4 +136,4 @@ def draw_errors(chain):  # type: ignore[no-untyped-def]
             for k in range(0, L, WIDTH):
                 scatter_records(work, k, L, body, record, at * L + k)
         for q in range(RECORD):  # the absent grain has no errors: walls and further places of short lists read it
-            body[RECORD * chain.size + q] = 0.0
+            body[RECORD * chain.grain_count + q] = 0.0

@@ -58,8 +58,8 @@ class Chain(NamedTuple):
     grains: GrainBlocks
     state: SamplerState
     workspace: Workspace
-    count: int  # of pairs
-    size: int  # of grains, m
+    pair_count: int
+    grain_count: int  # m
 
 
 def start_chain(pairs: SamplerPairs, grains: SamplerGrains, compliance: float, rng: np.random.Generator) -> Chain:

@@ -29,7 +29,7 @@ MUTANTS = [
         ("least = abs(t) / cone if new_z > ZERO else ZERO", "least = ZERO"),
         ("t = other if accepted else t", "t = t"),
         ("(step - step_other) * (step + step_other)", "(step_other - step) * (step + step_other)"),
-        ("h / gap_sd - ratio", "h / gap_sd + ratio"),
+        ("h * gap_sd * precision - ratio", "h * gap_sd * precision + ratio"),
         ("math.sqrt(gap_law + own * own)", "math.sqrt(gap_law) + own"),
         ("kappa * h * precision + mean_gauge", "mean_gauge"),
         ("(work[7 * L + k] - old_fn - value", "(work[7 * L + k] - value"),
@@ -58,7 +58,10 @@ MUTANTS = [
         ("work[5 * L + k] -= tx * tx + ty * ty", "work[5 * L + k] -= tx * tx"),
         ("mean[u + L + k] - delta * factor[f + 4 * L + k]", "mean[u + L + k]"),
         ("present[row * L + k] * weight_of", "weight_of"),
-        ("            body[RECORD * chain.size + q] = 0.0", "            body[RECORD * chain.size + q] = 1.0"),
+        (
+            "            body[RECORD * chain.grain_count + q] = 0.0",
+            "            body[RECORD * chain.grain_count + q] = 1.0",
+        ),
     ),
     *mutants_of(
         "solver/posterior/sampler/gibbs_sweeps.py",
