@@ -9,6 +9,12 @@ OTHER_CODE = "tests/app/cli/test_other_code.py"
 
 MUTANTS = [
     *mutants_of(
+        "app/process/machine/free_memory.py",
+        "tests/app/process/test_free_memory.py",
+        ("        _set(RETURNED)\n        release_free_memory()", "        release_free_memory()"),
+        ("    _returning = True", "    _returning = False"),
+    ),
+    *mutants_of(
         "app/process/lock.py",
         LOCK,
         ("if silence < LEASE:", "if silence < 0.0 * LEASE:"),
