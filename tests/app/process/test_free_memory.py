@@ -18,13 +18,19 @@ def settings(monkeypatch) -> list[object]:
     return found
 
 
+def fail() -> None:
+    raise ZeroDivisionError
+
+
 def test_freed_blocks_are_kept_for_a_while_and_returned_again(settings) -> None:
     free_memory.return_large_blocks()
-    with pytest.raises(ZeroDivisionError), free_memory.keep_freed_blocks():
+    with free_memory.keep_freed_blocks():
         assert settings == [free_memory.RETURNED, free_memory.KEPT]
-        raise ZeroDivisionError
     assert settings[2:] == [free_memory.RETURNED, "released"]
     assert all(free_memory.KEPT[name] > size for name, size in free_memory.RETURNED.items())
+    with pytest.raises(ZeroDivisionError):
+        free_memory.keep_freed_blocks()(fail)()
+    assert settings[-2:] == [free_memory.RETURNED, "released"]
 
 
 def test_the_setting_of_a_program_that_returns_nothing_stays(settings) -> None:
