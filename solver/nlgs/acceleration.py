@@ -13,10 +13,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ..aligned_memory import aligned_numbers
 from ..bodies.grains import Array
 from .problem import ContactProblem
 from .sweeping.contact_law import project_on_cone
-from .sweeping.kernels import apply_forces, measure_forces, measure_natural_map, workspace
+from .sweeping.kernels import apply_forces, measure_forces, measure_natural_map
 from .sweeping.ordering import GROUP
 
 PERIOD = 60  # sweeps between two steps; shorter periods cost more than they save in large packings
@@ -112,7 +113,7 @@ def inner_products(rows, vector):  # type: ignore[no-untyped-def]
     count = len(vector)
     for r in range(len(rows)):
         row = rows[r]
-        lanes = workspace(GROUP)
+        lanes = aligned_numbers(GROUP)
         lanes[:] = 0.0
         for block in range((count + GROUP - 1) // GROUP):
             first = block * GROUP

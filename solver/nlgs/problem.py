@@ -19,7 +19,7 @@ from ..bodies.grains import Array, GrainMotion, Grains
 from ..bodies.packing import Material
 from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts
-from .sweeping.grain_records import RECORD
+from ..grain_records import RECORD
 from .sweeping.ordering import GROUP, VisitingOrder, order_contacts
 
 PLATE_IMPEDANCE = 30.0  # of a loaded plate, in mean grain impedances

@@ -14,9 +14,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ...aligned_memory import aligned_numbers
 from ...array_copies import copy_matrix
+from ...grain_records import WIDTH, gather_records, scatter_records
 from .contact_law import relax_contact
-from .grain_records import WIDTH, gather_records, scatter_records
 from .measured_groups import (
     BEARING,
     CELL_ROWS,
@@ -85,7 +86,7 @@ def advance(problem, body, plate, force, sweeps, relaxation):  # type: ignore[no
     pair, ids = problem.pair.reshape(problem.pair.size), problem.pair_body.reshape(problem.pair_body.size)
     flat, flat_force = body.reshape(body.size), force.reshape(force.size)
     first = len(force) - len(problem.wall)
-    work = workspace(8 * L)
+    work = aligned_numbers(8 * L)
     in_cell = problem.pair.shape[1] == CELL_ROWS
     for _ in range(sweeps):
         if in_cell:
@@ -100,14 +101,6 @@ def advance(problem, body, plate, force, sweeps, relaxation):  # type: ignore[no
                 relax_pair(pair, ids, flat, 1, flat_force, c, ROWS, relaxation, mu)
         for c in range(len(problem.wall)):
             relax_wall(problem.wall, problem.wall_body, flat, 1, plate, flat_force, first + c, c, relaxation, wall_mu)
-
-
-@njit(inline="always")
-def workspace(size):  # type: ignore[no-untyped-def]
-    """Allocate `size` numbers aligned to a cache line; inlined, so that the compiler rules out aliasing."""
-    buffer = np.empty(size + 8)
-    start = (-(buffer.ctypes.data >> 3)) & 7
-    return buffer[start : start + size]
 
 
 @njit(inline="always")
@@ -211,7 +204,7 @@ def measure_forces(force, before):  # type: ignore[no-untyped-def]
     The first is the paper's ε_f = max |Δf| / |f| over contacts; a contact that loses its whole force counts as 1.
     """
     f, old, count = force.reshape(force.size), before.reshape(before.size), len(force)
-    sums = workspace(SUMS)
+    sums = aligned_numbers(SUMS)
     clear_sums(sums)
     for block in range(count // WIDTH):
         add_forces(f, 2 * WIDTH * block, old, 2 * WIDTH * block, sums)
@@ -242,7 +235,7 @@ def measure_natural_map(problem, body, plate, force, norm):  # type: ignore[no-u
     pair, ids = problem.pair.reshape(problem.pair.size), problem.pair_body.reshape(problem.pair_body.size)
     flat, f = body.reshape(body.size), force.reshape(force.size)
     first = len(force) - len(problem.wall)
-    sums = workspace(SUMS)
+    sums = aligned_numbers(SUMS)
     clear_sums(sums)
     total = 0.0
     if problem.pair.shape[1] == CELL_ROWS:
@@ -285,7 +278,7 @@ def measure_force_residual(problem, body):  # type: ignore[no-untyped-def]
         problem.external.reshape(problem.external.size),
     )
     count = len(body)
-    work = workspace(3 * L)  # worst, sum and number of grains, per lane
+    work = aligned_numbers(3 * L)  # worst, sum and number of grains, per lane
     work[:] = 0.0
     for block in range((count + L - 1) // L):
         first, second = block * (4 * L), block * (2 * L)

@@ -12,6 +12,7 @@ from llvmlite import ir
 from numba import njit
 from numba.core import cgutils
 
+from ...grain_records import RECORD, WIDTH, places_of, store_records, transpose
 from ...vectors import (
     INDEX,
     NUMBER,
@@ -24,7 +25,6 @@ from ...vectors import (
     subtract_product,
 )
 from .contact_law import relax_contact
-from .grain_records import RECORD, WIDTH, places_of, store_records, transpose
 from .ordering import GROUP as L
 
 # Offsets of the sums: squared residuals, squared forces, f_n, bearing contacts, greatest |Δf|² / |f|² of a contact as a

@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ...aligned_memory import aligned_numbers
 from ...array_copies import copy_matrix, copy_vector
-from .grain_records import RECORD, WIDTH
+from ...grain_records import RECORD, WIDTH
 from .kernels import (
     CELL_ROWS,
     ROWS,
@@ -24,7 +25,6 @@ from .kernels import (
     relax_pair,
     relax_wall,
     wall_residual,
-    workspace,
 )
 from .measured_groups import (
     RESIDUAL,
@@ -53,10 +53,10 @@ def advance_and_measure(problem, body, plate, force, equilibrium, relaxation, re
     flat_force, target = force.reshape(force.size), equilibrium.reshape(equilibrium.size)
     wall, wall_body, first = problem.wall, problem.wall_body, len(force) - len(problem.wall)
     # The present record of every grain is followed by that at the end of the last sweep, in one line of the cache.
-    both, previous_plate = workspace(2 * RECORD * L * len(equilibrium)), plate.copy()
+    both, previous_plate = aligned_numbers(2 * RECORD * L * len(equilibrium)), plate.copy()
     previous = both[RECORD:]
     _set_both(body, both)
-    work, sums = workspace(2 * RECORD * L), workspace(SUMS)
+    work, sums = aligned_numbers(2 * RECORD * L), aligned_numbers(SUMS)
     norm = 0.0
     for row in range(len(residuals)):
         clear_sums(sums)
@@ -114,7 +114,7 @@ def _greatest_unbalance(sums):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True, error_model="numpy")
 def greatest_force_residual(equilibrium, body):  # type: ignore[no-untyped-def]
     """Compute the worst |ΣF| [N] on a grain from the distance of its velocity to the equilibrium velocity."""
-    flat, target, sums = body.reshape(body.size), equilibrium.reshape(equilibrium.size), workspace(SUMS)
+    flat, target, sums = body.reshape(body.size), equilibrium.reshape(equilibrium.size), aligned_numbers(SUMS)
     clear_sums(sums)
     for block in range(len(body) // L):
         add_unbalance(flat, target, block, sums)

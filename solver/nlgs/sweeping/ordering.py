@@ -10,11 +10,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from ...bodies.grains import Array
 from ...contacts.contacts import Contacts
+from ...independent_blocks import independent_blocks
 
 GROUP = 32  # contacts between grains that share no grain; four vectors of eight numbers
 WALL_GROUP = 4  # contacts with walls: a frame has four walls
@@ -60,8 +60,11 @@ def visiting_order(
     if len(point) == 0:
         return np.empty(0, np.int64), 0
     order = np.argsort(_morton_code(point), kind="stable")
-    grouped, count = _independent_groups(i[order].astype(np.int64), j[order].astype(np.int64), size)
-    return order[grouped], count
+    bodies = np.column_stack([i[order], j[order]]).astype(np.int64)
+    items, begin = independent_blocks(2 * np.arange(len(order) + 1), bodies.ravel(), int(bodies.max()) + 1, size)
+    complete = np.diff(begin) == size
+    grouped = int(begin[len(complete) if complete.all() else np.argmin(complete)])
+    return order[np.concatenate([items[:grouped], np.sort(items[grouped:])])], grouped
 
 
 def _morton_code(point: Array) -> NDArray[np.uint64]:
@@ -76,46 +79,3 @@ def _spread(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
     for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
         x = (x | (x << np.uint64(shift))) & np.uint64(mask)
     return x
-
-
-@njit(cache=True)
-def _independent_groups(i, j, size):  # type: ignore[no-untyped-def]
-    """Fill groups one after the other, each with the first remaining contacts that share no body with it."""
-    count = len(i)
-    following = np.arange(1, count + 1)  # linked list of the remaining contacts
-    head = 0
-    last = -1
-    for c in range(count):
-        last = max(last, i[c], j[c])
-    group_of = np.full(last + 1, -1)  # last group of each body
-    order = np.empty(count, np.int64)
-    member = np.empty(size, np.int64)
-    placed = np.zeros(count, np.bool_)
-    groups = 0
-    while True:
-        found, predecessor, c = 0, -1, head
-        while c < count and found < size:
-            if group_of[i[c]] != groups and group_of[j[c]] != groups:
-                group_of[i[c]] = groups
-                group_of[j[c]] = groups
-                member[found] = c
-                found += 1
-                if predecessor < 0:
-                    head = following[c]
-                else:
-                    following[predecessor] = following[c]
-            else:
-                predecessor = c
-            c = following[c]
-        if found < size:
-            break
-        for k in range(size):
-            order[groups * size + k] = member[k]
-            placed[member[k]] = True
-        groups += 1
-    k = groups * size
-    for c in range(count):
-        if not placed[c]:
-            order[k] = c
-            k += 1
-    return order, groups * size

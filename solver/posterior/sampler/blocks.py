@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from ...bodies.grains import Array
+from ...independent_blocks import independent_blocks
 from .lanes import LANES
 from .records import Rows, SamplerGrains, SamplerPairs
 
@@ -58,7 +58,7 @@ def make_pair_blocks(pairs: SamplerPairs, grains: SamplerGrains) -> PairBlocks:
     resource = np.column_stack([pairs.i, np.where(between, pairs.j, -1), np.where(summed, m + pairs.group, -1)])
     size = int(np.clip(GREATEST_PART * count, 1, LANES))
     start = 3 * np.arange(count + 1)
-    row, blocks = _independent_blocks(start, resource.ravel(), m + len(grains.group_load), size)
+    row, blocks = _in_lanes(start, resource.ravel(), m + len(grains.group_load), size)
     place = np.empty(count, np.int64)
     place[row[row >= 0]] = np.flatnonzero(row >= 0)
     present, source = row >= 0, np.maximum(row, 0)
@@ -100,7 +100,7 @@ def make_grain_blocks(pairs: SamplerPairs, grains: SamplerGrains, place: Rows) -
     start = np.concatenate([[0], np.cumsum(np.bincount(grain, minlength=m))])
     by_radius = np.argsort(grain[order] % n, kind="stable")  # the pairs of a radius in all frames
     first = np.concatenate([[0], np.cumsum(np.bincount(grain % n, minlength=n))])
-    chosen, blocks = _independent_blocks(first, pair[by_radius], len(pairs.i), LANES)
+    chosen, blocks = _in_lanes(first, pair[by_radius], len(pairs.i), LANES)
     present = (chosen >= 0).reshape(blocks, 1, LANES)
     row = np.where(present, chosen.reshape(blocks, 1, LANES) + n * np.arange(frames)[:, None], m)
     row = row.reshape(blocks * frames, LANES)
@@ -125,39 +125,10 @@ def make_grain_blocks(pairs: SamplerPairs, grains: SamplerGrains, place: Rows) -
     )
 
 
-@njit(cache=True)
-def _independent_blocks(start, resource, resources, size):  # type: ignore[no-untyped-def]
-    """Fill blocks one after the other with the first remaining items that share no resource with it.
-
-    Items k use resource[start[k] : start[k + 1]], numbers from 0 to resources − 1, −1: none. Returns the items by block
-    (blocks × LANES,), −1 beyond the size, and the number of blocks.
-    """
-    count = len(start) - 1
-    following = np.arange(1, count + 1)  # linked list of the remaining items
-    used = np.full(resources, -1)  # last block of each resource
-    block_of, lane_of = np.empty(count, np.int64), np.empty(count, np.int64)
-    head, blocks = 0, 0
-    while head < count:
-        found, predecessor, k = 0, -1, head
-        while k < count and found < size:
-            free = True
-            for q in range(start[k], start[k + 1]):
-                free = free and (resource[q] < 0 or used[resource[q]] != blocks)
-            if free:
-                for q in range(start[k], start[k + 1]):
-                    if resource[q] >= 0:
-                        used[resource[q]] = blocks
-                block_of[k], lane_of[k] = blocks, found
-                found += 1
-                if predecessor < 0:
-                    head = following[k]
-                else:
-                    following[predecessor] = following[k]
-            else:
-                predecessor = k
-            k = following[k]
-        blocks += 1
-    items = np.full(blocks * LANES, -1)
-    for k in range(count):
-        items[block_of[k] * LANES + lane_of[k]] = k
-    return items, blocks
+def _in_lanes(start: Rows, resource: Rows, resources: int, size: int) -> tuple[Rows, int]:
+    """Items of independent blocks (blocks × LANES,), −1 beyond those of a block, and the number of blocks."""
+    items, begin = independent_blocks(start, resource, resources, size)
+    found = np.full(LANES * (len(begin) - 1), -1)
+    block = np.repeat(np.arange(len(begin) - 1), np.diff(begin))
+    found[LANES * block + np.arange(len(items)) - begin[block]] = items
+    return found, len(begin) - 1

@@ -7,9 +7,10 @@ import math
 import numpy as np
 from numba import njit
 
-from ...nlgs.sweeping.grain_records import WIDTH, gather_records
+from ...aligned_memory import aligned_numbers, aligned_singles
+from ...grain_records import WIDTH, gather_records
 from .blocks import FRICTION, GAP, NX, NY, RECORD, ROWS
-from .lanes import LANES, draw_uniform, logarithm, numbers, singles
+from .lanes import LANES, draw_uniform, logarithm
 from .state import CX, CY, DELTA, FX, FY, NORMAL_SUM, TORQUE
 from .truncated_normal import draw_above, normal_of
 
@@ -33,7 +34,7 @@ def draw_common(chain, model):  # type: ignore[no-untyped-def]
     body, ids, value = state.error.reshape(state.error.size), blocks.body.reshape(blocks.body.size), blocks.value
     value, z, fn, open_gap, common = value.reshape(value.size), state.bearing, state.fn, state.open_gap, state.common
     # Rows: errors of i and j; then sums, of which the first six are weighted by 1/b².
-    work, uniform = numbers(16 * L), singles(L)
+    work, uniform = aligned_numbers(16 * L), aligned_singles(L)
     for k in range(8 * L, 16 * L):
         work[k] = 0.0
     for block in range(len(blocks.grouped)):
@@ -88,7 +89,7 @@ def draw_scale(chain, model):  # type: ignore[no-untyped-def]
     state, common, group_load = chain.state, chain.state.common, chain.workspace.group_load
     fn, ft, group_sum = state.fn, state.ft, state.group_sum
     w = 1.0 / model.balance_sd**2
-    work, uniform = numbers(5 * L), singles(L)
+    work, uniform = aligned_numbers(5 * L), aligned_singles(L)
     for k in range(5 * L):
         work[k] = 0.0
     _add_contacts(chain, work)

@@ -7,7 +7,8 @@ import math
 import numpy as np
 from numba import njit
 
-from ...nlgs.sweeping.grain_records import WIDTH, gather_records, scatter_records
+from ...aligned_memory import aligned_numbers, aligned_singles
+from ...grain_records import WIDTH, gather_records, scatter_records
 from .blocks import (
     BALANCE_I,
     BALANCE_J,
@@ -30,7 +31,7 @@ from .blocks import (
     ROOT_T,
     ROWS,
 )
-from .lanes import HALF, LANES, ONE, TWO, ZERO, draw_uniform, exponential, logarithm, numbers, singles
+from .lanes import HALF, LANES, ONE, TWO, ZERO, draw_uniform, exponential, logarithm
 from .truncated_normal import distance_above, normal_of, scaled_log_tail
 
 L = LANES
@@ -112,7 +113,7 @@ def draw_contacts(chain, model):  # type: ignore[no-untyped-def]
     w, open_rate, tangential_sd = 1.0 / model.balance_sd**2, 1.0 / model.mean_open_gap, model.tangential_sd
     mean_gauge, count_gauge = model.mean_gauge / chain.pair_count, model.count_gauge / chain.pair_count
     # Rows: ΣF, ΣM, Σ f of the grains i and j; slope of a known sum; 1/√A; 1/√A_t; change of f; changes of e and N.
-    work, uniform, single = numbers(14 * L), singles(DRAWS * L), singles(SINGLES * L)
+    work, uniform, single = aligned_numbers(14 * L), aligned_singles(DRAWS * L), aligned_singles(SINGLES * L)
     for block in range(len(grouped)):
         first, p = block * L, block * ROWS * L
         for k in range(0, L, WIDTH):

@@ -7,9 +7,10 @@ import math
 import numpy as np
 from numba import njit
 
-from ...nlgs.sweeping.grain_records import WIDTH, gather_records, scatter_records
+from ...aligned_memory import aligned_numbers, aligned_singles
+from ...grain_records import WIDTH, gather_records, scatter_records
 from .blocks import RECORD
-from .lanes import LANES, draw_uniform, logarithm, numbers, singles
+from .lanes import LANES, draw_uniform, logarithm
 from .state import CX, CY, DELTA
 from .truncated_normal import normal_of
 
@@ -33,7 +34,7 @@ def factorize_errors(chain):  # type: ignore[no-untyped-def]
     pair, present = grains.pair.reshape(grains.pair.size), grains.present.reshape(grains.present.size)
     normal, weights = grains.normal.reshape(grains.normal.size), workspace.pair_weight.reshape(grains.pair.size)
     factor = workspace.centre_factor.reshape(workspace.centre_factor.size)
-    work = numbers(12 * L)  # sums of n'n'ᵀ/b² (3), n'/b² (2) and 1/b²; 1/b² of a row; the rows of the factor
+    work = aligned_numbers(12 * L)  # sums of n'n'ᵀ/b² (3), n'/b² (2) and 1/b²; 1/b² of a row; the rows of the factor
     for block in range(len(precision)):
         for k in range(L):
             precision[block, k] = grains.radius_precision[block, k]
@@ -89,8 +90,8 @@ def draw_errors(chain):  # type: ignore[no-untyped-def]
     factor, start, frames = workspace.centre_factor.reshape(workspace.centre_factor.size), grains.start, grains.frames
     residual, precision, random = workspace.residual, workspace.radius_precision, state.random
     # Rows: a record of the others; Σ n' r/b² (2); Σ r/b² less v·u, of all frames; δ.
-    work, mean = numbers(8 * L), numbers(2 * frames * L)
-    uniform = singles(2 * L)
+    work, mean = aligned_numbers(8 * L), aligned_numbers(2 * frames * L)
+    uniform = aligned_singles(2 * L)
     for block in range(len(precision)):
         for k in range(L):
             work[6 * L + k] = 0.0

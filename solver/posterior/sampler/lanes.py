@@ -93,22 +93,6 @@ def logarithm(x):  # type: ignore[no-untyped-def]
     return k * LN2_HIGH + (t + (k * LN2_LOW + (rest - HALF * square)))
 
 
-@njit(inline="always")
-def numbers(size):  # type: ignore[no-untyped-def]
-    """Allocate double-precision numbers aligned to a cache line; inlined, so that the compiler rules out aliasing."""
-    buffer = np.empty(size + 8)
-    start = (-(buffer.ctypes.data >> 3)) & 7
-    return buffer[start : start + size]
-
-
-@njit(inline="always")
-def singles(size):  # type: ignore[no-untyped-def]
-    """Allocate single-precision numbers in the same way."""
-    buffer = np.empty(size + 16, np.float32)
-    start = (-(buffer.ctypes.data >> 2)) & 15
-    return buffer[start : start + size]
-
-
 def seed_lanes(rng: np.random.Generator) -> NDArray[np.uint32]:
     """Draw the state (4 · LANES,) of one generator in each lane."""
     return rng.integers(1, 2**32, size=4 * LANES, dtype=np.uint32)

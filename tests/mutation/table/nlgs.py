@@ -134,8 +134,14 @@ MUTANTS = [
     *mutants_of(
         "solver/nlgs/sweeping/ordering.py",
         ("tests/reference/test_measures.py", "tests/solver/nlgs/sweeping/test_ordering.py"),
-        ("group_of[j[c]] = groups", "group_of[i[c]] = groups"),
+        ("np.sort(items[grouped:])", "items[grouped:]"),
         ("_spread(cell[:, 1]) << np.uint64(1)", "_spread(cell[:, 1]) << np.uint64(2)"),
+    ),
+    *mutants_of(
+        "solver/independent_blocks.py",
+        ("tests/reference/test_measures.py", "tests/solver/nlgs/sweeping/test_ordering.py"),
+        ("used[resource[q]] = blocks", "used[resource[q]] = -1"),
+        ("free = free and (resource[q] < 0", "free = free or (resource[q] < 0"),
     ),
     *mutants_of(
         "solver/nlgs/solve.py",

@@ -75,7 +75,6 @@ MUTANTS = [
         SAMPLER,
         ("np.full(len(pairs.i), -1.0), np.ones(len(between))", "np.ones(len(pairs.i)), np.ones(len(between))"),
         ("np.where(summed, m + pairs.group, -1)", "np.full(count, -1)"),
-        ("free = free and (resource[q] < 0", "free = free or (resource[q] < 0"),
         ("grain[order] % n, kind=", "grain[order], kind="),
         ("grains.radius_sd[radius] ** -2.0", "grains.radius_sd[radius] ** -1.0"),
     ),

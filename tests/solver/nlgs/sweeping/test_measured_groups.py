@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from numba import njit
-from rodsight.solver.nlgs.sweeping.grain_records import RECORD, WIDTH
+from rodsight.solver.grain_records import RECORD, WIDTH
 from rodsight.solver.nlgs.sweeping.measured_groups import (
     CELL_ROWS,
     RESIDUAL,

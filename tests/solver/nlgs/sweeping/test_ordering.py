@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from rodsight.solver.bodies.packing import Material
 from rodsight.solver.contacts.contacts import detect_contacts
+from rodsight.solver.grain_records import RECORD
 from rodsight.solver.nlgs.problem import assemble
-from rodsight.solver.nlgs.sweeping.grain_records import RECORD
 from rodsight.solver.nlgs.sweeping.ordering import GROUP, visiting_order
 
 from tests.packings import squeezed_heap

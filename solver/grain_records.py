@@ -8,7 +8,7 @@ implementations.
 
 from __future__ import annotations
 
-from ...vectors import INDEX, llvm_implementation_of, load, shuffle, store
+from .vectors import INDEX, llvm_implementation_of, load, shuffle, store
 
 RECORD = 4  # numbers of a grain
 WIDTH = 8  # grains of a transposition

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from numba import njit
-from rodsight.solver.nlgs.sweeping.grain_records import (
+from rodsight.solver.grain_records import (
     RECORD,
     WIDTH,
     gather_records,
