@@ -15,7 +15,7 @@ from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
 
 NUMBER, INDEX = ir.DoubleType(), ir.IntType(64)
-_LANE = ir.IntType(32)
+SINGLE, WORD = ir.FloatType(), ir.IntType(32)
 _FUSED = ("contract",)  # allows fused multiply-add
 
 
@@ -53,25 +53,30 @@ def _pointers(context, builder, kinds, values):  # type: ignore[no-untyped-def]
     ]
 
 
-def load(builder, place, count):  # type: ignore[no-untyped-def]
-    loaded = builder.load(builder.bitcast(place, ir.VectorType(NUMBER, count).as_pointer()))
-    loaded.align = 8  # bytes: arrays are aligned to numbers, not to vectors
+def load(builder, place, count, kind: ir.Type = NUMBER):  # type: ignore[no-untyped-def]
+    loaded = builder.load(builder.bitcast(place, ir.VectorType(kind, count).as_pointer()))
+    loaded.align = _bytes_of(kind)
     return loaded
 
 
 def store(builder, vector, place):  # type: ignore[no-untyped-def]
-    builder.store(vector, builder.bitcast(place, vector.type.as_pointer())).align = 8
+    builder.store(vector, builder.bitcast(place, vector.type.as_pointer())).align = _bytes_of(vector.type.element)
+
+
+def _bytes_of(kind):  # type: ignore[no-untyped-def]
+    """Alignment of a vector of such numbers: arrays are aligned to numbers, not to vectors."""
+    return 4 if kind in (SINGLE, WORD) else 8
 
 
 def shuffle(builder, a, b, lanes):  # type: ignore[no-untyped-def]
     lanes = list(lanes)
-    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_LANE, len(lanes)), lanes))
+    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(WORD, len(lanes)), lanes))
 
 
 def broadcast(builder, number, count):  # type: ignore[no-untyped-def]
     """A vector of equal numbers."""
     empty = ir.Constant(ir.VectorType(NUMBER, count), ir.Undefined)
-    first = builder.insert_element(empty, number, _LANE(0))
+    first = builder.insert_element(empty, number, WORD(0))
     return shuffle(builder, first, empty, [0] * count)
 
 
@@ -85,7 +90,7 @@ def subtract_product(builder, to, a, b):  # type: ignore[no-untyped-def]
 
 def total(builder, vector):  # type: ignore[no-untyped-def]
     """Sum of the numbers of a vector, added pairwise."""
-    parts = [builder.extract_element(vector, _LANE(k)) for k in range(vector.type.count)]
+    parts = [builder.extract_element(vector, WORD(k)) for k in range(vector.type.count)]
     while len(parts) > 1:
         parts = [builder.fadd(parts[k], parts[k + 1]) for k in range(0, len(parts), 2)]
     return parts[0]

@@ -204,11 +204,11 @@ def _draw_block(single, uniform):  # type: ignore[no-untyped-def]
     """Draw z, t √A_t, and f √A or γ/b, of the pairs of a block."""
     for k in range(L):
         x, y, mean_t, cone = single[X * L + k], single[Y * L + k], single[MEAN_T * L + k], single[CONE * L + k]
-        level_x, half_x = scaled_log_tail(-x)
-        level_y, _ = scaled_log_tail(-y)
-        against = single[LOG_ODDS * L + k] + logarithm(single[ODDS * L + k]) + level_y - level_x
+        scaled_x, log_tail_x = scaled_log_tail(-x)
+        scaled_y, _ = scaled_log_tail(-y)
+        against = single[LOG_ODDS * L + k] + logarithm(single[ODDS * L + k]) + scaled_y - scaled_x
         drawn = uniform[k] * (ONE + exponential(against)) < ONE
-        f = distance_above(-x, level_x - (half_x if x < ZERO else ZERO), logarithm(uniform[L + k]))
+        f = distance_above(-x, log_tail_x, logarithm(uniform[L + k]))
         t = mean_t + normal_of(logarithm(uniform[2 * L + k]))
         inside = abs(t) <= cone * f
         new_z = (ONE if inside else single[OLD_Z * L + k]) if drawn else ZERO  # outside of the cone: the old state
@@ -220,6 +220,6 @@ def _draw_block(single, uniform):  # type: ignore[no-untyped-def]
         t = other if accepted else t
         least = abs(t) / cone if new_z > ZERO else ZERO
         low = least - x if new_z > ZERO else -y
-        level, half = scaled_log_tail(low)
-        distance = distance_above(low, level - (half if low > ZERO else ZERO), logarithm(uniform[5 * L + k]))
+        _, log_tail = scaled_log_tail(low)
+        distance = distance_above(low, log_tail, logarithm(uniform[5 * L + k]))
         single[NEW_Z * L + k], single[DISTANCE * L + k], single[NEW_T * L + k] = new_z, least + distance, t

@@ -13,7 +13,7 @@ from llvmlite import ir
 from numba import njit, types
 from numpy.typing import NDArray
 
-from ...vectors import llvm_implementation_of
+from ...vectors import INDEX, SINGLE, WORD, llvm_implementation_of, load, store
 
 LANES = 16  # numbers of single precision in the widest registers
 ZERO, HALF, ONE, TWO = (np.float32(x) for x in (0.0, 0.5, 1.0, 2.0))
@@ -31,9 +31,7 @@ C0, C1, C2, C3, C4, C5, C6 = (
     for x in (0.333334103, -0.250009217, 0.199851278, -0.165928563, 0.146763966, -0.141184249, 0.0927221424)
 )
 
-_INTEGER, _SINGLE = ir.IntType(32), ir.FloatType()
-_INTEGERS, _SINGLES = ir.VectorType(_INTEGER, LANES), ir.VectorType(_SINGLE, LANES)
-_PLACE = ir.IntType(64)
+_WORDS, _SINGLES = ir.VectorType(WORD, LANES), ir.VectorType(SINGLE, LANES)
 
 
 def exponent_of(x):  # type: ignore[no-untyped-def]
@@ -55,24 +53,24 @@ def power_of_two(k):  # type: ignore[no-untyped-def]
 
 @llvm_implementation_of(exponent_of, types.float32)
 def _exponent_of(builder, kinds, values):  # type: ignore[no-untyped-def]
-    return builder.sitofp(_exponent_bits(builder, builder.bitcast(values[0], _INTEGER)), _SINGLE)
+    return builder.sitofp(_exponent_bits(builder, builder.bitcast(values[0], WORD)), SINGLE)
 
 
 @llvm_implementation_of(mantissa_of, types.float32)
 def _mantissa_of(builder, kinds, values):  # type: ignore[no-untyped-def]
-    bits = builder.bitcast(values[0], _INTEGER)
-    shifted = builder.shl(_exponent_bits(builder, bits), _INTEGER(MANTISSA_BITS))
-    return builder.bitcast(builder.sub(bits, shifted), _SINGLE)
+    bits = builder.bitcast(values[0], WORD)
+    shifted = builder.shl(_exponent_bits(builder, bits), WORD(MANTISSA_BITS))
+    return builder.bitcast(builder.sub(bits, shifted), SINGLE)
 
 
 @llvm_implementation_of(power_of_two, types.float32)
 def _power_of_two(builder, kinds, values):  # type: ignore[no-untyped-def]
-    biased = builder.add(builder.fptosi(values[0], _INTEGER), _INTEGER(EXPONENT_BIAS))
-    return builder.bitcast(builder.shl(biased, _INTEGER(MANTISSA_BITS)), _SINGLE)
+    biased = builder.add(builder.fptosi(values[0], WORD), WORD(EXPONENT_BIAS))
+    return builder.bitcast(builder.shl(biased, WORD(MANTISSA_BITS)), SINGLE)
 
 
 def _exponent_bits(builder, bits):  # type: ignore[no-untyped-def]
-    return builder.ashr(builder.sub(bits, _INTEGER(ROOT_HALF_BITS)), _INTEGER(MANTISSA_BITS))
+    return builder.ashr(builder.sub(bits, WORD(ROOT_HALF_BITS)), WORD(MANTISSA_BITS))
 
 
 @njit(forceinline=True, error_model="numpy", fastmath={"contract"})
@@ -128,28 +126,26 @@ def _draw_uniform(builder, kinds, values):  # type: ignore[no-untyped-def]
     random, out, first = values
 
     def row(q):  # type: ignore[no-untyped-def]
-        return builder.bitcast(builder.gep(random, [_PLACE(q * LANES)]), _INTEGERS.as_pointer())
+        return builder.gep(random, [INDEX(q * LANES)])
 
     def rotated(words, bits):  # type: ignore[no-untyped-def]
         return builder.or_(builder.shl(words, _equal(bits)), builder.lshr(words, _equal(32 - bits)))
 
-    a, b, c, d = (builder.load(row(q)) for q in range(4))
-    for word in (a, b, c, d):
-        word.align = 4
+    a, b, c, d = (load(builder, row(q), LANES, WORD) for q in range(4))
     number = builder.add(rotated(builder.add(a, d), 7), a)
     shifted = builder.shl(b, _equal(9))
     c, d = builder.xor(c, a), builder.xor(d, b)
     b, a = builder.xor(b, c), builder.xor(a, d)
     c, d = builder.xor(c, shifted), rotated(d, 11)
     for q, word in enumerate((a, b, c, d)):
-        builder.store(word, row(q)).align = 4
+        store(builder, word, row(q))
     upper = builder.uitofp(builder.lshr(number, _equal(8)), _SINGLES)
     drawn = builder.fadd(builder.fmul(upper, _all(2.0**-24)), _all(2.0**-25))
-    builder.store(drawn, builder.bitcast(builder.gep(out, [first]), _SINGLES.as_pointer())).align = 4
+    store(builder, drawn, builder.gep(out, [first]))
 
 
 def _equal(word: int) -> ir.Constant:
-    return ir.Constant(_INTEGERS, [word] * LANES)
+    return ir.Constant(_WORDS, [word] * LANES)
 
 
 def _all(number: float) -> ir.Constant:

@@ -79,7 +79,7 @@ def _initial_state(
     expected = 1.0 / (1.0 + np.exp(-pairs.odds))
     bearing = np.zeros(count)
     bearing[np.argsort(pairs.gap, kind="stable")[: round(float(expected.sum()))]] = 1.0
-    force = np.zeros((whole_blocks(len(grains.lever)), RECORD))
+    force = np.zeros((_whole_blocks(len(grains.lever)), RECORD))
     force[: len(grains.lever), :2] = grains.load
     on_other = bearing[:, None] * pairs.normal
     np.subtract.at(force[:, :2], pairs.i, on_other)
@@ -100,7 +100,7 @@ def _initial_state(
 
 def _make_workspace(grains: SamplerGrains, blocks: PairBlocks, by_grain: GrainBlocks) -> Workspace:
     gap = blocks.value[:, GAP].flatten()  # a copy
-    grain = np.zeros((whole_blocks(len(grains.lever)), 5))
+    grain = np.zeros((_whole_blocks(len(grains.lever)), 5))
     columns = grains.load, grains.balance_weight, grains.pressure, grains.pressure_weight
     grain[: len(grains.lever)] = np.column_stack(columns)
     return Workspace(
@@ -109,6 +109,6 @@ def _make_workspace(grains: SamplerGrains, blocks: PairBlocks, by_grain: GrainBl
     )  # fmt: skip
 
 
-def whole_blocks(grains: int) -> int:
+def _whole_blocks(grains: int) -> int:
     """Records of this many grains and an absent one, in whole blocks."""
     return -(-(grains + 1) // LANES) * LANES

@@ -62,10 +62,11 @@ def mills_ratio(t):  # type: ignore[no-untyped-def]
 
 @njit(forceinline=True, error_model="numpy", fastmath={"contract"})
 def scaled_log_tail(low):  # type: ignore[no-untyped-def]
-    """Compute ln Q(low), without the term −low²/2 where low > 0, and low²/2. Q is the tail, 1 − Φ."""
+    """Compute ln Q(low) without the term −low²/2 where low > 0, and with it. Q is the tail, 1 − Φ."""
     half_square = HALF * low * low
     tail = mills_ratio(abs(low)) * DENSITY
-    return logarithm(tail if low > ZERO else ONE - tail * exponential(-half_square)), half_square
+    scaled = logarithm(tail if low > ZERO else ONE - tail * exponential(-half_square))
+    return scaled, scaled - (half_square if low > ZERO else ZERO)
 
 
 @njit(forceinline=True, error_model="numpy", fastmath={"contract"})
@@ -103,5 +104,5 @@ def distance_above(low, log_tail, log_uniform):  # type: ignore[no-untyped-def]
 def draw_above(low, log_uniform):  # type: ignore[no-untyped-def]
     """Compute x − low ≥ 0 of a single bound of double precision."""
     bound = np.float32(low)
-    level, half_square = scaled_log_tail(bound)
-    return np.float64(distance_above(bound, level - (half_square if bound > ZERO else ZERO), log_uniform))
+    _, log_tail = scaled_log_tail(bound)
+    return np.float64(distance_above(bound, log_tail, log_uniform))

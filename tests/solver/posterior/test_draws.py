@@ -33,8 +33,8 @@ def map_logarithm(x):
 
 @njit
 def log_tail(x):
-    level, half = scaled_log_tail(x)
-    return level - (half if x > 0.0 else 0.0)
+    _, found = scaled_log_tail(x)
+    return found
 
 
 @njit
