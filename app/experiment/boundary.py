@@ -14,6 +14,7 @@ from ..solver.bodies.cell import Cell, unwrap
 from ..solver.bodies.outer_grains import FreeSurface, find_outer_grains
 from ..solver.bodies.walls import Walls
 from ..tracks import Tracks, WallTracks
+from .coincident_rods import refuse_coincident_rods
 from .config.input_sections import OUTER
 from .experiment import Experiment, rows_of
 from .reading.tables import Table, check_unique
@@ -45,7 +46,7 @@ def apply_boundary(experiment: Experiment, tracks: Tracks, walls: WallTracks | N
 
 
 def check_cell(file: Path | str, tracks: Tracks, walls: WallTracks) -> None:
-    """Raise InputError with the frame in which a pair could touch in two of its images."""
+    """Raise InputError with the frame in which a pair could touch in two of its images, or is at one place."""
     assert walls.cell is not None
     needed = WIDEST * 2.0 * float(tracks.radius.max())
     for k, vectors in enumerate(walls.cell):
@@ -55,6 +56,7 @@ def check_cell(file: Path | str, tracks: Tracks, walls: WallTracks) -> None:
                 file, f"frame {k}", f"makes a cell {height:g} m high: it must be higher than two of the largest "
                 f"diameters, {needed:g} m, in each direction; all in metres",
             )  # fmt: skip
+    refuse_coincident_rods(file, tracks.id, tracks.radius, tracks.position, walls.cell)
 
 
 def free_surfaces(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> list[str]:

@@ -275,6 +275,8 @@ def arrange_tracks(grains: Table, poses: Table, times: Table, precision: float) 
 
     A grain without a row in a frame is lost there. precision: standard deviation of a position component [m].
     """
+    from .coincident_rods import refuse_coincident_rods  # SciPy is loaded late: a photograph is read before
+
     ids, radius = grains.integers("id"), grains.numbers("radius")
     check_unique(grains, "id", ids)
     _all_positive(grains, "radius", radius)
@@ -286,6 +288,7 @@ def arrange_tracks(grains: Table, poses: Table, times: Table, precision: float) 
     position, rotation = np.full((*shape, 2), np.nan), np.full(shape, np.nan)
     position[frame, row] = np.column_stack([poses.numbers("x"), poses.numbers("y")])
     rotation[frame, row] = poses.optional_numbers("theta")
+    refuse_coincident_rods(poses.file, ids, radius, position)
     present = np.isfinite(position).all(axis=2)
     return Tracks(
         id=ids,
@@ -308,7 +311,11 @@ def read_grain_guess(experiment: Experiment) -> GrainGuess | None:
     ids, radius = table.integers("id"), table.numbers("radius")
     check_unique(table, "id", ids)
     _all_positive(table, "radius", radius)
-    return GrainGuess(ids, table.numbers("x"), table.numbers("y"), radius)
+    guess = GrainGuess(ids, table.numbers("x"), table.numbers("y"), radius)
+    from .coincident_rods import refuse_coincident_rods  # SciPy is loaded late: a photograph is read before
+
+    refuse_coincident_rods(table.file, ids, radius, np.column_stack([guess.x, guess.y])[None])
+    return guess
 
 
 def arrange_cell(table: Table, frame_count: int) -> Array:
