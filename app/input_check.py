@@ -33,13 +33,15 @@ class InputReport:
     sufficient: bool | None = None  # whether forces with r >= .9 are expected; None: not predicted
     notes: tuple[str, ...] = field(default_factory=tuple)  # remarks on the input
     diagnosis: tuple[Finding, ...] = field(default_factory=tuple)  # causes of what contradicts the forces
+    tracked: int | None = None  # grains with a pose in at least one frame of given tracks; None: photographs
     unused: tuple[str, ...] = field(default_factory=tuple)  # columns of tables that are not used
     prediction: tuple[str, ...] = field(default_factory=tuple)  # the verdict, then sentences on the data
 
     def content(self) -> str:
         """Describe the content of the experiment in a phrase."""
         if not self.photographs:
-            return f"{self.grains} grains tracked over {self.frames} frames, {self.boundaries}"
+            grains = f"{self.grains}" if self.tracked in (None, self.grains) else f"{self.tracked} of {self.grains}"
+            return f"{grains} grains tracked over {self.frames} frames, {self.boundaries}"
         detected = "" if self.grains is None else f", {self.grains} grains in the first"
         return f"{self.frames} photographs{detected}, {self.boundaries}"
 
@@ -88,7 +90,8 @@ def _check_input(run: Run, predict: bool) -> InputReport:
     return InputReport(
         run.experiment.name, count, photographed, first.grain_count,
         () if walls is None else walls.name, _describe_boundaries(tracks, walls), *found.expected,
-        found.good if found.trial is not None else None, tuple(run.notes), found.diagnosis, unused, tuple(sentences),
+        found.good if found.trial is not None else None, tuple(run.notes), found.diagnosis,
+        None if tracks is None else int(tracks.present.any(axis=0).sum()), unused, tuple(sentences),
     )  # fmt: skip
 
 

@@ -19,12 +19,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 from . import __version__
 from .compilation.ahead import SOLVER_KERNELS, TRACKING_KERNELS, KernelsAhead
 from .experiment.config.experiment_file import as_toml
-from .experiment.experiment import Experiment, Stamp, checksums, stamp_of_input
+from .experiment.experiment import CONFIG_NAME, Experiment, Stamp, checksums, stamp_of_input
 from .experiment.reading.input_files import regular
 from .process.atomic import PART
 from .process.errors import InputError
 from .process.frame_range import ALL_FRAMES, FrameRange
-from .process.links import refuse_link
+from .process.links import refuse_file, refuse_link
 from .process.lock import hold_folder
 from .process.progress import Progress, no_progress
 from .process.sources import hash_of_code
@@ -274,8 +274,13 @@ def _hash_of(facts: list[Any]) -> str:
 def hold_run(run: Run) -> Iterator[Run]:
     """Give the run while no other process works in its folder; partly written files of a stopped one are removed.
 
-    Raises RunError while another process works in the folder, and InputError where it belongs to another experiment.
+    Raises RunError while another process works in the folder, and InputError where it belongs to another experiment, is
+    itself one, or cannot be a folder.
     """
+    refuse_file(run.folder)
+    if (run.folder / CONFIG_NAME).is_file():
+        own = f"is the folder of an experiment, with its {CONFIG_NAME}: choose another one for the results with --out"
+        raise InputError(run.folder, "", own)
     refuse_foreign_folder(run.folder, run.experiment)
     for name in (UNFINISHED, TRACKED):  # they are emptied
         refuse_link(run.folder / name)

@@ -14,7 +14,14 @@ from .command_list import command_line
 HELP = ("-h", "--help")
 DESCRIPTION = "Contact forces from photographs."
 _CHOICE = re.compile(r"invalid choice '(.*?)' for argument '(\S+)'\. Expected one of \((.*?)\)")
-_VALUE = re.compile(r"Error parsing (\S+):.*?\['(.*?)'")
+_VALUE = re.compile(r"Error parsing (\S+):.*?\[(?='(.*?)')([^\]]*)\]")
+_PLAIN_VALUE = re.compile(r"Error parsing (\S+): [^\[]*?: (?='(.*?)')(\S+)")  # of an option with one kind of value
+_EACH = re.compile(r"'(.*?)'")
+# Words of a box by which a number is expected, in the order in which they are looked for.
+_KINDS = (
+    (re.compile(r"\bint\(|\bINT\b|\bFRAME\b"), int, "a whole number"),
+    (re.compile(r"\bfloat\b|\bFLOAT\b"), float, "a number"),
+)
 _MISSING = re.compile(r"Missing value for argument '(.+?)'|Missing from [^:]+: (\S+)")
 _UNRECOGNISED = re.compile(r"Unrecognized options: ([^,\s]+)")
 FRAME = "─-│|╭╰╮╯+"
@@ -50,10 +57,8 @@ def _error(arguments: Sequence[str], box: str) -> InputError:
     if found := _CHOICE.search(text):
         choices = sorted({*re.findall(r"'(.*?)'", found[3])} - {"None"})
         return InputError(command, f"{found[2]} {found[1]}", f"is not one of {', '.join(choices)}")
-    if found := _VALUE.search(text):
-        right = _number_of(found[1], found[2])
-        hint = f"; see {command} --help" if right is None else f": write {found[1]} {right!r}"
-        return InputError(command, f"{found[1]} {found[2]}", f"is not a value of this option{hint}")
+    if found := _VALUE.search(text) or _PLAIN_VALUE.search(text):
+        return _wrong_value(command, found[1], _EACH.findall(found[3]) or [found[2]], text)
     if found := _MISSING.search(text):
         name = found[1] or found[2]
         if name.startswith("--"):
@@ -64,6 +69,25 @@ def _error(arguments: Sequence[str], box: str) -> InputError:
     if found := _UNRECOGNISED.search(text):
         return InputError(command, found[1], f"is one argument too many; see {command} --help")
     return InputError(command, "", text)
+
+
+def _wrong_value(command: str, option: str, values: list[str], text: str) -> InputError:
+    """Return the error of an option's values; text: of the box, which states the kind of value that was expected."""
+    for sign, kind, words in _KINDS:
+        if sign.search(text):
+            value = next((each for each in values if not _is_a(kind, each)), values[0])
+            right = None if kind is int else _number_of(option, value)
+            hint = f"; see {command} --help" if right is None else f": write {option} {right!r}"
+            return InputError(command, f"{option} {value}", f"is not {words}{hint}")
+    return InputError(command, f"{option} {values[0]}", f"is not a value of this option; see {command} --help")
+
+
+def _is_a(kind: type[int] | type[float], text: str) -> bool:
+    try:
+        kind(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _number_of(option: str, text: str) -> float | None:

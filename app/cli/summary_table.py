@@ -44,9 +44,10 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
     count = summary["status_count"]
     settled, total = count.get("settled", 0), summary["frame_count"]
     after = summary["settled_after"]
+    how_many = f"{settled} of {total} frames {'is' if settled == 1 else 'are'} settled"
     lines = [
         f"[bold]{summary['grain_count']} grains, {total} frames.[/] "
-        + (f"Settled from frame {after}; {settled} of {total} frames are settled." if settled else "No frame settled.")
+        + (f"Settled from frame {after}; {how_many}." if settled else "No frame settled.")
     ]
     events = [
         f"{label} at frame{'s' if len(summary[key]) > 1 else ''} {_listed(summary[key])}"
@@ -243,8 +244,8 @@ def calibration_lines(facts: dict[str, Any]) -> list[str]:
     lines += _scale_line(facts)
     if facts["lens"] != 0.0:
         lines.append(
-            f"Lens: the residual radial distortion moves the farthest corner by {1e6 * facts['lens']:+.0f} ± "
-            f"{1e6 * facts['lens_sd']:.0f} µm outward."
+            "Lens: the residual radial distortion moves the farthest corner by "
+            f"{_moved(facts['lens'], facts['lens_sd'])}."
         )
     lines.append(
         f"Gap of touching surfaces, before → after: between grains "
@@ -324,12 +325,17 @@ def _walls(walls: dict[str, dict[str, float]]) -> str:
     for name, wall in walls.items():
         words = []
         if abs(wall["outward"]) > NOTICEABLE * wall["outward_sd"]:
-            words.append(f"{1e6 * wall['outward']:+.0f} ± {1e6 * wall['outward_sd']:.0f} µm outward")
+            words.append(_moved(wall["outward"], wall["outward_sd"]))
         if abs(wall["tilt"]) > NOTICEABLE * wall["tilt_sd"]:
             words.append(f"rotated by {1e3 * wall['tilt']:+.2f} ± {1e3 * wall['tilt_sd']:.2f} mrad")
         if words:
             parts.append(f"wall {name} {' and '.join(words)}")
     return "".join(f", {words}" for words in parts)
+
+
+def _moved(outward: float, sd: float) -> str:
+    """State how far something moves outward or inward [m], with its standard deviation [m]."""
+    return f"{1e6 * abs(outward):.0f} ± {1e6 * sd:.0f} µm {'inward' if outward < 0.0 else 'outward'}"
 
 
 def _pair(facts: dict[str, Any], part: str) -> str:

@@ -74,7 +74,8 @@ def _nearest_pairs(place: Array, cell: Cell | None) -> tuple[NDArray[np.int64], 
     point, owner = place[rows], np.arange(len(rows))
     if cell is not None:
         point, owner = cell.with_images(point, float(np.sqrt(cell.area / len(rows))))
-    distance, other = (np.asarray(found)[:, 1] for found in KDTree(point).query(point[: len(rows)], 2))
+    found = KDTree(point).query(point[: len(rows)], 2)
+    distance, other = np.asarray(found[0], np.float64)[:, 1], np.asarray(found[1], np.int64)[:, 1]
     pairs = np.sort(np.column_stack([rows, rows[owner[np.minimum(other, len(owner) - 1)]]]), axis=1)
     # Of equal centres a query may give a point itself as the second: then another point has it as its nearest.
     known = np.isfinite(distance) & (pairs[:, 0] != pairs[:, 1])

@@ -24,7 +24,7 @@ from .pictures.image import Channel, ImageSelection
 from .pictures.picture_file import read_photograph
 from .reading.input_files import InputFiles
 from .reading.photograph_order import NUMBER, ORDER_COLUMNS, GivenOrder, arrange_order, relative_name
-from .reading.tables import Table, check_frames, check_unique, read_table
+from .reading.tables import Table, check_frame_count, check_frames, check_unique, read_table
 
 CONFIG_NAME = "experiment.toml"
 POSITION_COLUMNS = ("frame", "id", "x", "y")  # of a pose without its rotation
@@ -240,9 +240,7 @@ def arrange_times(table: Table, frame_count: int) -> Array:
     """Return the time of every frame (f,) [s], ascending, from a table frame,time."""
     frame, time = table.integers("frame"), table.numbers("time")
     check_unique(table, "frame", frame)
-    found = check_frames(table, frame)
-    if found != frame_count:
-        raise InputError(table.file, "frame", f"has times of {found} frames, but there are {frame_count} frames")
+    check_frame_count(table, "times", check_frames(table, frame), frame_count)
     beyond = np.flatnonzero(np.abs(time) > MAX_TIME)
     if len(beyond):
         raise table.error(int(beyond[0]), "time", f"is beyond {MAX_TIME:.0e} s (285 years): times are in seconds")
@@ -322,9 +320,7 @@ def arrange_cell(table: Table, frame_count: int) -> Array:
     """Return the cell's vectors (f, 2, 2) [m] from a table frame,ax,ay,bx,by, without jumps by whole vectors."""
     frame = table.integers("frame")
     check_unique(table, "frame", frame)
-    found = check_frames(table, frame)
-    if found != frame_count:
-        raise InputError(table.file, "frame", f"has cells of {found} frames, but there are {frame_count} frames")
+    check_frame_count(table, "cells", check_frames(table, frame), frame_count)
     order = np.argsort(frame)
     vectors = np.column_stack([table.numbers(c) for c in CELL_COLUMNS[1:]]).reshape(-1, 2, 2)
     flat = np.flatnonzero(np.abs(np.linalg.det(vectors)) <= FLAT * np.prod(np.linalg.norm(vectors, axis=2), axis=1))

@@ -15,7 +15,7 @@ from ..tracks import BAR, CORNER, UNSPECIFIED, WallTracks
 from .config.input_sections import WallsSection
 from .experiment import CELL_COLUMNS, Experiment, arrange_cell
 from .reading.corners import CORNER_COLUMNS, FrameCorners, arrange_corners, bar_of_each_corner, bars_of_corners
-from .reading.tables import Table, check_frames, check_unique
+from .reading.tables import Table, check_frame_count, check_frames, check_unique
 
 ENDS = {"bar": BAR, "corner": CORNER, "auto": UNSPECIFIED}
 SIDES = {"in": IN, "out": OUT}
@@ -131,8 +131,8 @@ def arrange_walls(table: Table, frame_count: int, *, followed: bool = False) -> 
     """
     frame, names, row = _named_rows(table)
     found = int(frame.max()) + 1 if followed and frame.min() == 0 else check_frames(table, frame)
-    if found > frame_count or (found < frame_count and not followed):
-        raise InputError(table.file, "frame", f"has walls of {found} frames, but there are {frame_count} frames")
+    if found > frame_count or not followed:
+        check_frame_count(table, "walls", found, frame_count)
     endpoints = np.full((frame_count, len(names), 2, 2), np.nan)
     endpoints[frame, row] = np.column_stack([table.numbers(c) for c in WALL_COLUMNS[2:]]).reshape(-1, 2, 2)
     absent = np.argwhere(np.isnan(endpoints[: 1 if followed else None, :, 0, 0]))

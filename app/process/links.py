@@ -1,4 +1,4 @@
-"""Links in folders of the program's own files: it makes none, and follows none that lead elsewhere."""
+"""Links and files in the place of folders: the program makes no links, and follows none that lead elsewhere."""
 
 from __future__ import annotations
 
@@ -23,6 +23,13 @@ def refuse_link(place: Path) -> None:
     """Raise InputError for a link in the place of a file or folder of the program's own."""
     if os.path.islink(place):
         raise InputError(place, "", "is a link, and belongs to the program: remove it")
+
+
+def refuse_file(folder: Path) -> None:
+    """Raise InputError where a folder of results is a file, or would be below one."""
+    existing = next((each for each in (folder, *folder.parents) if os.path.lexists(each)), None)
+    if existing is not None and not existing.is_dir():
+        raise InputError(existing, "", "is a file, not a folder: choose a folder for the results with --out")
 
 
 def _links(folder: Path) -> Iterator[Path]:

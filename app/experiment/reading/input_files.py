@@ -20,16 +20,20 @@ def regular(file: Path) -> Path:
 
 
 def read_text_file(file: Path) -> bytes:
-    """Return the bytes of a text file. Raises InputError where it has holes, OSError.
+    """Return the bytes of a text file. Raises InputError where it is empty or has holes, OSError.
 
     A hole is read as NULs, which no text holds, and takes no disk: the file can be larger than any memory.
     """
     if hasattr(os, "SEEK_HOLE"):
         with regular(file).open("rb") as stream:
-            hole, size = os.lseek(stream.fileno(), 0, os.SEEK_HOLE), os.fstat(stream.fileno()).st_size
+            size = os.fstat(stream.fileno()).st_size
+            hole = os.lseek(stream.fileno(), 0, os.SEEK_HOLE) if size else 0
         if hole < size:
             raise InputError(file, "", f"is no text: it has a hole at byte {hole} of {size}")
-    return regular(file).read_bytes()
+    content = regular(file).read_bytes()
+    if not content:
+        raise InputError(file, "", "is empty: it has 0 bytes")
+    return content
 
 
 class InputFiles:

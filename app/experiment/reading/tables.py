@@ -204,6 +204,14 @@ def check_frames(table: Table, frame: NDArray[np.int64]) -> int:
     return len(present)
 
 
+def check_frame_count(table: Table, content: str, found: int, expected: int) -> None:
+    """Raise InputError where a table does not have as many frames as the experiment; content: its rows in a word."""
+    if found != expected:
+        given, there = ("1 frame" if count == 1 else f"{count} frames" for count in (found, expected))
+        verb = "is" if expected == 1 else "are"
+        raise InputError(table.file, "frame", f"has {content} of {given}, but there {verb} {there}")
+
+
 def check_unique(table: Table, column: str, *keys: NDArray[np.int64]) -> None:
     """Raise InputError with the later row where two rows have the same keys."""
     number = np.zeros(len(table), np.int64)

@@ -196,8 +196,9 @@ def examine_poses(tracks: Tracks, impossible: NDArray[np.bool_]) -> list[Finding
         frames = np.flatnonzero(impossible.any(axis=1)).tolist()
         words = ", ".join(map(str, frames[:4])) + ("…" if len(frames) > 4 else "")
         count = int(impossible.sum())
-        subject = "1 pose jumps" if count == 1 else f"{count} poses jump"
-        found.append(finding("outlier_tracks", f"{subject} against its neighbours and back, in photographs {words}"))
+        subject = "1 pose jumps against its" if count == 1 else f"{count} poses jump against their"
+        where = "photograph" if len(frames) == 1 else "photographs"
+        found.append(finding("outlier_tracks", f"{subject} neighbours and back, in {where} {words}"))
     missing = 1.0 - float(tracks.present.mean())
     if MISSING < missing < 1.0:
         found.append(finding("missing_poses", f"{100.0 * missing:.0f} % of the poses are missing"))

@@ -31,12 +31,17 @@ def rivals_of(inputs: Inputs) -> Iterator[Rival]:
     for stretch in STRETCHES:
         yield Rival("stretched_picture", f"x is stretched by {-100.0 * stretch:g} %", _stretched(stretch))
     for error in RADIUS_ERRORS:
-        yield Rival("all_radii", f"all radii are stated {-100.0 * error:+.0f} % wrong", _with_radii(1.0 + error))
+        yield Rival("all_radii", f"all radii are stated {_wrong_by(error)}", _with_radii(1.0 + error))
     classes = np.unique(np.round(inputs.tracks.radius, 6))
     if 1 < len(classes) <= MOST_CLASSES:
         for error in CLASS_ERRORS:
-            words = f"the largest rods are stated {-100.0 * error:+.0f} % wrong"
+            words = f"the largest rods are stated {_wrong_by(error)}"
             yield Rival("class_radii", words, _with_class(float(classes[-1]), 1.0 + error))
+
+
+def _wrong_by(error: float) -> str:
+    """State how wrong a radius is that has to be multiplied by 1 + error."""
+    return f"{100.0 * abs(error):.0f} % too {'large' if error < 0.0 else 'small'}"
 
 
 def _stretched(stretch: float) -> Callable[[Inputs], Inputs]:

@@ -106,3 +106,16 @@ def test_a_folder_that_another_experiment_claims_meanwhile_is_refused(tracked, t
     monkeypatch.setattr(run_folder, "hold_folder", claimed_first)
     with pytest.raises(InputError, match="of another experiment"), hold_run(Run(load_experiment(tracked), out)):
         pass
+
+
+@pytest.mark.parametrize("command", ["run", "track", "solve", "record", "sensitivity"])
+def test_results_go_neither_to_a_file_nor_into_an_experiment(command, tracked, capsys):
+    before = {file: file.read_bytes() for file in tracked.iterdir()}
+    table = tracked / "tracks.csv"
+    for out, words in ((table, "is a file"), (table / "below", "is a file"), (tracked, "folder of an experiment")):
+        assert rodsight(command, tracked, "--out", out, "--quiet") == 2
+        line = capsys.readouterr().err
+        assert words in line
+        assert "--out" in line
+        assert line.count("\n") == 1
+    assert before == {file: file.read_bytes() for file in tracked.iterdir()}

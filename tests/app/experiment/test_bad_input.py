@@ -46,6 +46,9 @@ MISTAKES = {
     "time goes back": (TIMES, lambda f: swap_row(f, 4, {1: "0.5"}), ["row 4", "0.5"]),
     "truth unknown grain": ("truth_contacts.csv", lambda f: swap_row(f, 2, {1: "999"}), ["row 2", "999"]),
     "truth unknown wall": ("truth_contacts.csv", lambda f: swap_row(f, 2, {2: "roof"}), ["row 2", "roof"]),
+    "table of 0 bytes": (TRACKS, lambda f: f.write_bytes(b""), ["tracks.csv: is empty"]),
+    "experiment of 0 bytes": (TOML, lambda f: f.write_bytes(b""), ["experiment.toml: is empty"]),
+    "times of one frame": (TIMES, lambda f: cut(f, 2), ["times of 1 frame, but there are 5 frames"]),
     "empty table": (GRAINS, lambda f: f.write_text("id,radius\n"), ["no rows"]),
 }
 

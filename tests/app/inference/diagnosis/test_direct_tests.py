@@ -172,7 +172,7 @@ def test_jumps_and_missing_poses_are_named():
     (jump,) = named_poses(replace(tracks, position=position))
     assert jump.cause == "outlier_tracks"
     assert "1 pose jumps" in jump.evidence
-    assert "photographs 4" in jump.evidence
+    assert "photograph 4" in jump.evidence
     lost = np.random.default_rng(7).random((FRAMES, N)) < 0.1
     status = np.where(lost, np.uint8(TrackStatus.LOST), tracks.status)
     (missing,) = named_poses(
