@@ -21,6 +21,8 @@ from .process.errors import UndeterminedError
 from .process.machine.linear_algebra import one_thread_each
 from .process.progress import Progress, no_progress
 from .results.finding import Finding
+from .solver.assessment.penalties import TRUST_OF_FEW, describe_few_grains, describe_few_photographs
+from .solver.assessment.trust import interior_limit
 from .tracks import Tracks, WallTracks
 
 if TYPE_CHECKING:
@@ -57,10 +59,15 @@ class Prediction:
 
     @property
     def expected(self) -> tuple[float, float, float]:
-        """Expected r(f_n), and an interval with a coverage of two thirds; NaN where there is no trial."""
+        """Expected r(f_n), and an interval with a coverage of two thirds; NaN where there is no trial.
+
+        With too few photographs all are limited as the trust of the run is.
+        """
         if self.trial is None:
             return NO_EXPECTATION
-        return self.trial.expect(contradicted=any(each.cause not in CORRECTED for each in self.diagnosis))
+        r, low, high = self.trial.expect(contradicted=any(each.cause not in CORRECTED for each in self.diagnosis))
+        most = TRUST_OF_FEW if describe_few_photographs(self.trial.photographs) else 1.0
+        return min(r, most), min(low, most), min(high, most)
 
     @property
     def good(self) -> bool:
@@ -74,12 +81,16 @@ class Prediction:
             return self.remark or NOT_PREDICTED
         # A prediction of 1.00 would claim more than any evidence gives.
         r, low, high = (min(each, MOST_STATED) for each in (r, low, high))
-        number = f"expected r(f_n) {r:.2f} ({low:.2f} to {high:.2f})"
+        number, interval = f"expected r(f_n) {r:.2f}", f"{low:.2f} to {high:.2f}"
+        number += "" if interval == f"{r:.2f} to {r:.2f}" else f" ({interval})"
         if self.trial.stride > 1:
             number += f" from every {_ordinal(self.trial.stride)} photograph, --frames ::{self.trial.stride}"
+        causes = " ".join(each.sentence() for each in self.diagnosis)
+        if self._too_few:
+            return f"The forces cannot be judged: {self._too_few}; {number}. {causes}".rstrip()
         obstacle = "" if self.quality is None else self.quality.obstacle
-        if self.diagnosis:
-            return f"Something is wrong: {number}. {' '.join(each.sentence() for each in self.diagnosis)}"
+        if causes:
+            return f"Something is wrong: {number}. {causes}"
         if r >= GOOD:
             return f"The forces can be found: {number}."
         if r < POOR and obstacle:
@@ -88,6 +99,18 @@ class Prediction:
         if r < POOR:
             return f"Something is wrong: {number}; {reason}."
         return f"The forces are uncertain: {number}; {reason}."
+
+    @property
+    def _too_few(self) -> str:
+        """Why forces cannot be judged, be they right or wrong: too few photographs or interior grains; empty: they can.
+
+        Both limit the trust of the run, too.
+        """
+        assert self.trial is not None
+        few = describe_few_photographs(self.trial.photographs)
+        if not few and all(interior_limit(each) < POOR for each in self.trial.evidence):
+            few = describe_few_grains(self.trial.evidence[0])
+        return few
 
     def describe(self) -> list[str]:
         """State the prediction, then what the data are like."""

@@ -99,7 +99,7 @@ def penalise_friction(frame: FrameForces, check: FrictionCheck | None, *, measur
 
 
 def limit_for_few_photographs(frame: FrameForces, count: int) -> FrameForces:
-    """Limit the trust in a frame of a test of so few photographs that no motion confirms that of another.
+    """Limit trust and expected correlation in a test of so few photographs that no motion confirms that of another.
 
     Parameters
     ----------
@@ -107,10 +107,33 @@ def limit_for_few_photographs(frame: FrameForces, count: int) -> FrameForces:
     count : int
         Photographs of the whole test.
     """
-    if count >= FEW_PHOTOGRAPHS or not frame.trust > TRUST_OF_FEW:
+    words = describe_few_photographs(count)
+    if not words or not frame.trust > TRUST_OF_FEW:
         return frame
-    words = f"the test has only {count} photographs: one motion alone is not confirmed by another; take more"
-    return replace(frame, trust=TRUST_OF_FEW, trust_penalties="; ".join(filter(None, (words, frame.trust_penalties))))
+    return replace(
+        frame,
+        trust=TRUST_OF_FEW,
+        expected_correlation=min(frame.expected_correlation, TRUST_OF_FEW),
+        trust_penalties="; ".join(filter(None, (words, frame.trust_penalties))),
+    )
+
+
+def describe_few_photographs(count: int) -> str:
+    """State that a test of so many photographs has too few of them; empty: it has enough."""
+    if count >= FEW_PHOTOGRAPHS:
+        return ""
+    photographs = "1 photograph" if count == 1 else f"{count} photographs"
+    return f"the test has only {photographs}: one motion alone is not confirmed by another; take more"
+
+
+def describe_few_grains(evidence: Evidence) -> str:
+    """State that a packing has too few interior grains; empty: it has enough."""
+    if interior_limit(evidence) >= 1.0:
+        return ""
+    grains = "1 grain has" if evidence.interior == 1 else f"{evidence.interior} grains have"
+    return (
+        f"only {grains} neighbours all around: too few to judge their forces; photograph a larger part of the packing"
+    )
 
 
 def _contradictions(evidence: Evidence) -> list[Penalty]:
@@ -169,12 +192,8 @@ def _softness(evidence: Evidence) -> Penalty | None:
 
 
 def _size(evidence: Evidence) -> Penalty | None:
-    limit = interior_limit(evidence)
-    words = (
-        f"only {evidence.interior} grains have neighbours all around: too few to judge their forces; photograph "
-        "a larger part of the packing"
-    )
-    return Penalty(1.0 - limit, words, counted=True) if limit < 1.0 else None
+    words = describe_few_grains(evidence)
+    return Penalty(1.0 - interior_limit(evidence), words, counted=True) if words else None
 
 
 def _unseen(evidence: Evidence) -> Penalty | None:

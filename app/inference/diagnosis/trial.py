@@ -32,6 +32,7 @@ class Trial:
 
     evidence: tuple[Evidence, ...]  # of the judged frames
     stride: int  # between the photographs that were solved
+    photographs: int = PREDICTED_PHOTOGRAPHS  # that were at hand
 
     @property
     def expected(self) -> tuple[float, float, float]:
@@ -94,7 +95,7 @@ def solve_trial(
     solve_frames(correct_sequence(given), store, InferenceObserver() if observer is None else observer)
     judged = store.frames[min(SETTLED, len(store.frames) - 1) :]
     evidence = tuple(each.state.evidence for each in judged if each.state.evidence.assessed)
-    return Trial(evidence, stride) if evidence else None
+    return Trial(evidence, stride, inputs.tracks.frame_count) if evidence else None
 
 
 def select_window(inputs: Inputs, photographs: int = TRIAL_PHOTOGRAPHS, first: int = 0) -> tuple[Inputs, int]:

@@ -12,7 +12,7 @@ from rodsight.inference.diagnosis.trial import Trial
 from rodsight.prediction import Prediction
 from rodsight.solver.assessment.evidence import Evidence
 from rodsight.solver.assessment.expected_correlation import predict_correlation
-from rodsight.solver.assessment.penalties import find_penalties
+from rodsight.solver.assessment.penalties import TRUST_OF_FEW, find_penalties
 from rodsight.study.scenarios.predictions import TRUE_CAUSE, PredictionOutcome, print_predictions
 from rodsight.study.scenarios.scenario_score import ScenarioScore
 from rodsight.synthetic.scenarios.scenario_table import SCENARIOS
@@ -95,9 +95,27 @@ def test_rival_inputs_are_compared_where_the_first_twelve_photographs_leave_them
     assert len(diagnosed) == 1
 
 
+def test_too_few_photographs_or_interior_rods_are_stated_first_and_limit_the_prediction_as_the_trust():
+    two = Prediction(GOOD, Trial((SOUND,), 1, 2))
+    assert two.expected == (TRUST_OF_FEW,) * 3
+    assert not two.good
+    assert two.verdict() == (
+        "The forces cannot be judged: the test has only 2 photographs: one motion alone is not confirmed by another; "
+        "take more; expected r(f_n) 0.28."
+    )
+    contradicted = replace(two, diagnosis=(finding("friction", "it slides"),)).verdict()
+    assert contradicted.startswith("The forces cannot be judged: the test has")
+    assert "it slides" in contradicted
+    assert Prediction(GOOD, Trial((SOUND,), 1, 3)).good
+    few = Prediction(GOOD, Trial((replace(SOUND, interior=5),), 1))
+    assert few.expected[0] == pytest.approx(0.25, abs=1e-3)
+    assert few.verdict().startswith("The forces cannot be judged: only 5 grains have neighbours all around")
+    assert few.verdict().endswith("expected r(f_n) 0.25.")
+
+
 def test_no_verdict_states_a_correlation_of_one(monkeypatch):
     monkeypatch.setattr(Trial, "expect", lambda *_, **__: (0.998, 0.996, 0.9991))
-    assert predicted(SOUND).verdict() == "The forces can be found: expected r(f_n) 0.99 (0.99 to 0.99)."
+    assert predicted(SOUND).verdict() == "The forces can be found: expected r(f_n) 0.99."
 
 
 def test_the_verdict_names_what_contradicts_the_forces():

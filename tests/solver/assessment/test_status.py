@@ -220,4 +220,4 @@ def test_without_a_motion_nothing_is_assessed():
 def test_few_interior_grains_limit_the_trust_and_are_reported(interior, most):
     few = replace(SOUND, interior=interior)
     assert trust(few) <= most < trust(SOUND)
-    assert f"only {interior} grains" in describe_penalties(few)
+    assert f"only {interior} grain" in describe_penalties(few)
