@@ -28,6 +28,7 @@ from .experiment.walls import read_walls
 from .out_of_date import out_of_date
 from .process.atomic import write_atomically
 from .process.errors import InputError
+from .process.frame_range import ALL_FRAMES, FrameRange
 from .process.machine.free_memory import release_free_memory, return_large_blocks
 from .process.machine.linear_algebra import one_thread_each
 from .process.sources import hash_of_code
@@ -319,6 +320,21 @@ def add_error_budget(run: Run, workers: int) -> Results:
     run.timings.add("error budget", since)
     conclude(run, results, load_truth(run, results), since)
     return results
+
+
+def keep_finished_frames(run: Run) -> None:
+    """Raise InputError where frames are requested whose results would replace those of other finished frames.
+
+    For commands that solve only what is missing: run and solve themselves replace results by those of other frames.
+    """
+    stored, results = run.manifest.fact("frames"), run.file(RESULTS)
+    if not results.is_file() or not isinstance(stored, list) or run.frames.covers(finished := FrameRange(*stored)):
+        return
+    held = "all frames" if finished == ALL_FRAMES else f"the frames {finished}"
+    raise InputError(
+        "--frames", str(run.frames), f"{results} holds {held}, which these would replace: leave --frames out, or "
+        "choose another folder with --out; rodsight share RUN --frames A:B makes a recording of some frames",
+    )  # fmt: skip
 
 
 def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:

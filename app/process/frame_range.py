@@ -23,6 +23,12 @@ class FrameRange(NamedTuple):
         ends = (self.start, -1 if self.stop is None else self.stop)
         return ends if self.step == 1 else (*ends, self.step)
 
+    def covers(self, other: FrameRange) -> bool:
+        """Whether all photographs of another range are among these."""
+        ends = self.stop is None or (other.stop is not None and other.stop <= self.stop)
+        steps = other.step % self.step == 0 and (other.start - self.start) % self.step == 0
+        return ends and steps and other.start >= self.start
+
     def number(self, row: int) -> int:
         """Return the photograph of a row of the run."""
         return self.start + row * self.step

@@ -261,6 +261,7 @@ def record(
     request = request.with_setting("recording.sweeps", sweeps)
     began = time.perf_counter()
     with open_run(request) as run:
+        pipeline.keep_finished_frames(run)
         results = pipeline.solve(run)
         truth = load_truth(run, results)
         if run.timings.seconds:  # the results are new, and so is their summary

@@ -58,6 +58,7 @@ def sensitivity(
     if budget:
         return _attribute_error(request, processes, as_json=as_json)
     with open_run(request) as run:
+        pipeline.keep_finished_frames(run)
         varied, cases = designs.plan(run.experiment, design, factors, samples, seed)
         if scheduler is not None:
             reach_scheduler(scheduler)
@@ -83,6 +84,7 @@ def _attribute_error(request: Request, workers: int, *, as_json: bool) -> int:
     from ..summary_table import budget_lines
 
     with open_run(request) as run:
+        pipeline.keep_finished_frames(run)
         summary = summarize(pipeline.add_error_budget(run, workers), None, {})
     if as_json:
         print(json.dumps(summary["error_budget"], indent=1))

@@ -7,10 +7,12 @@ import json
 import numpy as np
 import pytest
 from rodsight.cli.arguments import parse_frames
+from rodsight.experiment.experiment import load_experiment
 from rodsight.experiment.jpeg_photographs import JpegPhotographs
 from rodsight.process.errors import InputError
 from rodsight.results.hdf5.store import load_results, origin_of
 from rodsight.reviewing.reviewed_run import open_reviewed_run
+from rodsight.run_folder import Run, hold_run
 
 from tests.program import rodsight
 
@@ -45,6 +47,32 @@ def test_a_stride_solves_what_a_table_of_these_photographs_would(tracked, tmp_pa
     capsys.readouterr()
     assert rodsight("score", str(tmp_path / "table"), "--json") == 0
     assert scored["r_fn"] == json.loads(capsys.readouterr().out)["r_fn"]
+
+
+@pytest.mark.parametrize(
+    ("given", "other", "covered"),
+    [
+        (":", "0:12", True), ("0:12", "0:12", True), ("0:2", "0:12", False), ("0:2", ":", False), ("0:12", "2:4", True),
+        ("2:", "0:4", False), ("::2", ":", False), (":", "::3", True), ("::2", "::4", True), ("1::2", "::4", False),
+    ],
+)  # fmt: skip
+def test_a_range_covers_another(given, other, covered):
+    assert parse_frames(given).covers(parse_frames(other)) == covered
+
+
+@pytest.mark.parametrize("command", ["record", "sensitivity"])
+def test_finished_frames_are_not_replaced_by_fewer(command, tracked, tmp_path, capsys):
+    out = tmp_path / "out"
+    run = Run(load_experiment(tracked), out)
+    with hold_run(run):
+        run.write_manifest()
+        (out / "results.h5").write_bytes(b"of all frames")
+    before = {file: file.read_bytes() for file in out.iterdir()}
+    assert rodsight(command, tracked, "--out", out, "--frames", "0:2", "--quiet") == 2
+    line = capsys.readouterr().err
+    assert f"--frames: 0:2: {out / 'results.h5'} holds all frames, which" in line
+    assert "rodsight share" in line
+    assert before == {file: file.read_bytes() for file in out.iterdir()}
 
 
 def test_a_range_may_have_a_step():
