@@ -11,7 +11,7 @@ import pandas as pd
 
 from ..exchange.tidy_tables import AT_WALL
 from ..experiment.experiment import load_experiment
-from ..experiment.reading.tables import write_table
+from ..experiment.reading.tables import Table
 from ..process.errors import InputError
 from ..process.frame_range import ALL_FRAMES, FrameRange
 from ..results.comparison import Comparison, DifferentPackingError, FieldFrame, compare_runs, compare_with_truth
@@ -23,11 +23,13 @@ from ..run_folder import Run as RunFolder
 from ..run_folder import find_experiment
 from ..run_truth import load_truth, truth_beside
 from ..solver.contacts.pairs import align
+from .arguments import as_table
 from .made_runs import open_run
 from .run import Run
 
 Source = Run | str | PathLike[str]
 TRUTH = "truth"
+PAIR_COLUMNS = ("frame", "i", "j")
 
 
 def score(results: Source, truth: str | PathLike[str] | pd.DataFrame | None = None) -> pd.DataFrame:
@@ -132,7 +134,7 @@ def review(
         Verdicts to add instead of opening the page: columns frame, i, j (or j = −1 and wall), and perhaps verdict
         ('contact', 'no contact', 'unsure'; absent: every row is a contact).
     reviewer : str, optional
-        Who judges; default: the user's name.
+        Who judges; default: the user's name, or the name of the table's file.
     complete : bool
         The table lists every contact of its frames: all other candidate pairs are no contacts.
     page : bool
@@ -165,8 +167,8 @@ def review(
         raise InputError("review", "", "needs a run with a folder: rodsight.run, not rodsight.solve")
     with tempfile.TemporaryDirectory(prefix="rodsight-") as place:
         if isinstance(verdicts, pd.DataFrame):
-            table = Path(place) / "verdicts.csv"
-            write_table(table, {str(name): column.tolist() for name, column in _with_wall_names(verdicts).items()})
+            named = _with_wall_names(verdicts)
+            table = as_table("verdicts", named, [*PAIR_COLUMNS, *(each for each in named if each not in PAIR_COLUMNS)])
             verdict_tables.import_verdicts_of_run(file, table, reviewer=reviewer, complete=complete)
         elif verdicts is not None:
             verdict_tables.import_verdicts_of_run(file, Path(verdicts), reviewer=reviewer, complete=complete)
@@ -209,17 +211,10 @@ def _truth_of(run: Run, truth: str | PathLike[str] | pd.DataFrame | None) -> Tru
 
 
 def _arrange_truth(run: Run, truth: pd.DataFrame) -> TruthContacts:
-    missing = [name for name in TRUTH_COLUMNS if name not in truth]
-    if missing:
-        raise InputError("truth", f"column {missing[0]}", "there is no such column")
-    with tempfile.TemporaryDirectory(prefix="rodsight-") as place:
-        file = Path(place) / "truth.csv"
-        named = _with_wall_names(truth)
-        write_table(file, {name: named[name].tolist() for name in TRUTH_COLUMNS})
-        return _read(file, run)
+    return _read(as_table("truth", _with_wall_names(truth), TRUTH_COLUMNS), run)
 
 
-def _read(file: Path, run: Run) -> TruthContacts:
+def _read(file: Path | Table, run: Run) -> TruthContacts:
     results = run.results
     return read_truth(
         file, results.tracks.id, results.walls.name, frames=_frames(run), frame_count=len(results.frames)

@@ -20,9 +20,9 @@ from ..process.progress import Progress
 from ..run_folder import Run as RunFolder
 from ..run_folder import hold_run
 from ..tracks import Tracks, TrackStatus
+from .arguments import as_strings
 from .made_runs import run
 from .run import Run
-from .setting_strings import as_strings
 from .shown_progress import shown_progress
 
 Settings = Mapping[str, object]

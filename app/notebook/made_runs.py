@@ -16,8 +16,8 @@ from ..process.progress import Progress
 from ..run_folder import RESULTS, hold_run
 from ..run_folder import Run as RunFolder
 from ..run_truth import load_truth
+from .arguments import as_strings
 from .run import Run
-from .setting_strings import as_strings
 from .shown_progress import shown_progress
 
 

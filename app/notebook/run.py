@@ -16,6 +16,7 @@ from ..results.results import Results
 from ..results.summary import summarize
 from ..run_folder import RECORDING
 from ..run_truth import truth_of
+from .arguments import as_whole
 from .inline import show_recording
 
 if TYPE_CHECKING:
@@ -275,7 +276,8 @@ class Run:
         needs_truth = name in NEED_TRUTH and against is None
         truth = truth_of(self._source) if needs_truth and isinstance(self._source, Path) else None
         other = None if against is None else against.results
-        return draw_figure(self.results, name, frame, width=width, truth=truth, against=other)
+        number = None if frame is None else self.checked_frame(frame)
+        return draw_figure(self.results, name, number, width=width, truth=truth, against=other)
 
     def __repr__(self) -> str:
         tracks = self.results.tracks
@@ -283,7 +285,7 @@ class Run:
         return f"<rodsight.Run {self.name!r}: {tracks.grain_count} grains, {tracks.frame_count} frames{state}>"
 
     def checked_frame(self, frame: int) -> int:
-        """Return the frame. Raises IndexError if there is no such frame.
+        """Return the frame. Raises IndexError if there is no such frame, and InputError for what is no frame's number.
 
         Examples
         --------
@@ -291,10 +293,10 @@ class Run:
         Traceback (most recent call last):
         IndexError: there is no frame 7: frames go from 0 to 4
         """
-        count = self.results.tracks.frame_count
-        if not 0 <= frame < count:
-            raise IndexError(f"there is no frame {frame}: frames go from 0 to {count - 1}")
-        return frame
+        number, count = as_whole("frame", frame), self.results.tracks.frame_count
+        if not 0 <= number < count:
+            raise IndexError(f"there is no frame {number}: frames go from 0 to {count - 1}")
+        return number
 
     @cached_property
     def _tables(self) -> dict[str, pd.DataFrame]:

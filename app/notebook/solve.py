@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -24,7 +23,6 @@ from ..experiment.experiment import (
     arrange_cell,
     arrange_tracks,
 )
-from ..experiment.reading.tables import Table
 from ..experiment.walls import ARC_COLUMNS, LOAD_COLUMNS, WALL_COLUMNS, arrange_arcs, arrange_loads, arrange_walls
 from ..inference.infer_sequence import infer_sequence
 from ..inference.inference_settings import material_of, settings_of
@@ -35,13 +33,11 @@ from ..process.progress import Progress
 from ..solver.bodies.cell import unwrap
 from ..solver.bodies.wall_shapes import STRAIGHT
 from ..tracks import Tracks, WallTracks
+from .arguments import as_frame, as_mapping, as_strings, as_table, is_number
 from .run import Run
-from .setting_strings import as_strings
 from .shown_progress import shown_progress
 
 Columns = pd.DataFrame | Mapping[str, Any]  # of equal length, by name
-OPTIONAL = "theta"  # column whose values may be NaN
-WHOLE = ("frame", "id")  # columns of whole numbers, which data frames may store as floats
 
 
 def solve(
@@ -106,11 +102,12 @@ def solve(
     Traceback (most recent call last):
     rodsight.process.errors.InputError: tracks: column radius: there is no such column
     """
-    texts = as_strings({f"material.{key}": value for key, value in (material or {}).items()} | dict(settings or {}))
-    sections = load_sections(texts)
+    given = as_mapping("material", material or {}, 'keys to values, such as {"friction": 0.25}')
+    texts = as_strings({f"material.{key}": value for key, value in given.items()}, "material")
+    sections = load_sections([*texts, *as_strings(settings or {})])
     refuse_unused_keys(sections, "settings")
-    tracked = _arrange_tracks(pd.DataFrame(tracks), precision)
-    wall_tracks = _arrange_walls(walls, arcs, load, tracked.frame_count, pressure or {})
+    tracked = _arrange_tracks(as_frame("tracks", tracks), precision)
+    wall_tracks = _arrange_walls(walls, arcs, load, tracked.frame_count, {} if pressure is None else pressure)
     tracked, wall_tracks = _add_boundary(tracked, wall_tracks, boundary)
     inputs = Inputs(tracked, wall_tracks, material_of(sections), settings_of(sections))
     shown, kernels = progress or shown_progress(), KernelsAhead()
@@ -124,9 +121,9 @@ def solve(
 
 
 def _arrange_tracks(tracks: pd.DataFrame, precision: float) -> Tracks:
-    if not (np.isfinite(precision) and precision > 0):
+    if not (is_number(precision) and precision > 0):
         raise InputError("precision", repr(precision), "is not a positive number of metres")
-    poses = _table("tracks", tracks, POSE_COLUMNS if "theta" in tracks else POSITION_COLUMNS)
+    poses = as_table("tracks", tracks, POSE_COLUMNS if "theta" in tracks else POSITION_COLUMNS)
     if "radius" not in tracks:
         raise InputError("tracks", "column radius", "there is no such column")
     _check_constant(tracks, "id", "radius")
@@ -138,7 +135,7 @@ def _arrange_tracks(tracks: pd.DataFrame, precision: float) -> Tracks:
         frames = sorted(tracks["frame"].unique())
         times = pd.DataFrame({"frame": frames, "time": np.asarray(frames, np.float64)})
     return arrange_tracks(
-        _table("tracks", grains, GRAIN_COLUMNS), poses, _table("tracks", times, TIME_COLUMNS), precision
+        as_table("tracks", grains, GRAIN_COLUMNS), poses, as_table("tracks", times, TIME_COLUMNS), precision
     )
 
 
@@ -157,12 +154,14 @@ def _add_boundary(
     if isinstance(boundary, pd.DataFrame | Mapping):
         if walls.count:
             raise InputError("boundary", "", "a periodic cell replaces the walls: give one of them")
-        table = _table("boundary", pd.DataFrame(boundary), CELL_COLUMNS)
+        table = as_table("boundary", as_frame("boundary", boundary), CELL_COLUMNS)
         walls = replace(walls, cell=arrange_cell(table, tracks.frame_count))
         check_cell("boundary", tracks, walls)
         assert walls.cell is not None
         return replace(tracks, position=unwrap(tracks.position, walls.cell)), walls
-    table = _table("boundary", pd.DataFrame({"id": list(boundary)}), ("id",))
+    if not isinstance(boundary, Iterable):
+        raise InputError("boundary", repr(boundary), f'must be ids, the columns of a cell, or "{OUTER}"')
+    table = as_table("boundary", pd.DataFrame({"id": list(boundary)}), ("id",))
     return replace(tracks, boundary=boundary_of(table, tracks)), walls
 
 
@@ -175,23 +174,23 @@ def _arrange_walls(
 ) -> WallTracks:
     names, endpoints = (), np.empty((frame_count, 0, 2, 2))
     if walls is not None:
-        names, endpoints = arrange_walls(_table("walls", pd.DataFrame(walls), WALL_COLUMNS), frame_count)
+        names, endpoints = arrange_walls(as_table("walls", as_frame("walls", walls), WALL_COLUMNS), frame_count)
     side = None
     if arcs is not None:
-        table = pd.DataFrame(arcs)
+        table = as_frame("arcs", arcs)
         columns = (*ARC_COLUMNS, "theta") if "theta" in table else ARC_COLUMNS
-        circles, ends, arc_side = arrange_arcs(_table("arcs", table, columns), frame_count, others=names)
+        circles, ends, arc_side = arrange_arcs(as_table("arcs", table, columns), frame_count, others=names)
         side = np.concatenate([np.full(len(names), STRAIGHT, np.int8), arc_side])
         names, endpoints = names + circles, np.concatenate([endpoints, ends], axis=1)
-    for name, value in pressure.items():
+    for name, value in as_mapping("pressure", pressure, 'walls to pascals, such as {"top": 50e3}').items():
         if name not in names:
             raise InputError("pressure", repr(name), f"is not the name of a wall: there are {', '.join(names)}")
-        if not (np.isfinite(value) and value > 0):
+        if not (is_number(value) and value > 0):
             raise InputError("pressure", f"{name} = {value!r}", "is not a positive number of pascals")
     pressed = np.array([pressure.get(name, np.nan) for name in names], np.float64)
     measured = None
     if load is not None:
-        measured = arrange_loads(_table("load", pd.DataFrame(load), LOAD_COLUMNS), names, frame_count, pressed)
+        measured = arrange_loads(as_table("load", as_frame("load", load), LOAD_COLUMNS), names, frame_count, pressed)
     return WallTracks(names, endpoints, pressed, side=side, load=measured)
 
 
@@ -201,20 +200,3 @@ def _check_constant(frame: pd.DataFrame, by: str, column: str) -> None:
     changing = counts.index[np.asarray(counts) > 1]
     if len(changing):
         raise InputError("tracks", f"{by} = {changing[0]}", f"has more than one {column}")
-
-
-def _table(name: str, frame: pd.DataFrame, columns: Sequence[str]) -> Table:
-    """Convert columns to a table as read from a file, for the same checks and messages."""
-    for column in columns:
-        if column not in frame:
-            raise InputError(name, f"column {column}", f"there is no such column among {', '.join(map(str, frame))}")
-    if frame.empty:
-        raise InputError(name, "", "has no rows")
-    return Table(Path(name), {column: _texts(column, frame[column]) for column in columns}, list(range(len(frame))))
-
-
-def _texts(column: str, values: Iterable[Any]) -> list[str]:
-    array = np.asarray(values)
-    if column in WHOLE and array.dtype.kind == "f" and np.all(array == np.floor(array)):
-        array = array.astype(np.int64)
-    return ["" if column == OPTIONAL and each != each else str(each) for each in array.tolist()]  # NaN: unknown

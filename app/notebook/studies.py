@@ -25,7 +25,7 @@ from ..robustness.execution import reach_scheduler
 from ..run_folder import Run as RunFolder
 from ..run_folder import hold_run
 from ..solver.parallel import available_cores
-from .setting_strings import as_strings
+from .arguments import as_strings
 from .shown_progress import shown_progress
 
 TABLE = "campaign.csv"  # of a campaign given as a data frame, in its folder

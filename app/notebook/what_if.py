@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -27,11 +27,13 @@ from ..solver.statistics.frame_statistics import FrameStatistics
 from ..solver.statistics.stress import friction_angle, love_weber_stress, wall_forces
 from ..tracks import Tracks
 from ..verdicts.decisions import BodyNames
+from .arguments import as_mapping, is_number
 from .comparisons import Source, as_run
 from .run import Run
 from .shown_progress import shown_progress
 
 Pairs = Iterable[tuple[int, int | str]]
+PAIR_EXAMPLE = "such as (3, 7) or (3, 'top')"
 T = TypeVar("T")
 
 
@@ -89,7 +91,7 @@ def what_if(
     """
     run = as_run(results)
     stored = run.results
-    if friction is not None and not (np.isfinite(friction) and friction >= 0.0):
+    if friction is not None and not (is_number(friction) and friction >= 0.0):
         raise InputError("what_if", f"friction = {friction!r}", "is not a coefficient of friction")
     frames = range(stored.tracks.frame_count) if frame is None else (run.checked_frame(frame),)
     forbidden, forced = _keys(stored, forbid, "forbid"), _keys(stored, force, "force")
@@ -119,14 +121,25 @@ def _keys(results: Results, pairs: Pairs, name: str) -> np.ndarray:
     bodies = BodyNames.of(results.tracks, results.walls)
     rows = bodies.rows()
     found = set()
-    for i, j in pairs:
+    for i, j in _as_pairs(pairs, name):
         for body in (i, j):
-            if body not in rows:
+            if not isinstance(body, Hashable) or body not in rows:
                 raise InputError("what_if", f"{name} = {(i, j)}", f"{body!r} is neither a grain's id nor a wall's name")
         if rows[i] == rows[j]:
             raise InputError("what_if", f"{name} = {(i, j)}", "is one body")
         found.add(bodies.key(*sorted((rows[i], rows[j]))))
     return np.array(sorted(found), np.int64)
+
+
+def _as_pairs(pairs: Pairs, name: str) -> Iterator[tuple[Any, Any]]:
+    """Yield both bodies of every pair. Raises InputError for what is no pair."""
+    if not isinstance(pairs, Iterable) or isinstance(pairs, str):
+        raise InputError("what_if", f"{name} = {pairs!r}", f"is no list of pairs, {PAIR_EXAMPLE}")
+    for pair in pairs:
+        bodies = tuple(pair) if isinstance(pair, Iterable) and not isinstance(pair, str) else ()
+        if len(bodies) != 2:
+            raise InputError("what_if", f"{name} = {pairs!r}", f"{pair!r} is no pair of bodies, {PAIR_EXAMPLE}")
+        yield bodies[0], bodies[1]
 
 
 def _with_verdicts(inputs: Inputs, frames: Iterable[int], forbidden: np.ndarray, forced: np.ndarray) -> Inputs:
@@ -154,11 +167,13 @@ def _moved(inputs: Inputs, frames: Iterable[int], move: Mapping[int, tuple[float
 
 def _steps(tracks: Tracks, move: Mapping[int, tuple[float, float]]) -> dict[int, np.ndarray]:
     """The displacements by row. Raises InputError for unknown grains."""
-    steps = {}
-    for name, step in move.items():
+    steps, example = {}, "ids to displacements [m], such as {3: (1e-5, 0.0)}"
+    for name, step in as_mapping("what_if: move", move, example).items():
         row = np.flatnonzero(tracks.id == name)
         if not len(row):
             raise InputError("what_if", f"move = {name}", "is not the id of a grain")
+        if not isinstance(step, Sequence | np.ndarray) or len(step) != 2 or not all(map(is_number, step)):
+            raise InputError("what_if", f"move = {{{name}: {step!r}}}", f"is no mapping of {example}")
         steps[int(row[0])] = np.asarray(step, np.float64)
     return steps
 

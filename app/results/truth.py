@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from ..experiment.reading.input_files import InputFiles
-from ..experiment.reading.tables import check_frames, check_unique, read_table
+from ..experiment.reading.tables import Table, check_frames, check_unique, read_table
 from ..process.errors import InputError
 from ..process.frame_range import ALL_FRAMES, FrameRange
 from ..solver.bodies.grains import Array
@@ -25,7 +25,7 @@ CLOSE = 0.5  # radii: largest distance between a grain and its true position
 
 
 def read_truth(
-    file: Path,
+    file: Path | Table,
     ids: NDArray[np.int64],
     walls: tuple[str, ...],
     *,
@@ -41,7 +41,7 @@ def read_truth(
     Parameters
     ----------
     file
-        Table frame,i,j,fn,ft.
+        Table frame,i,j,fn,ft, or its file.
     ids
         Id of every grain in the truth (n,), negative for grains that the truth does not have.
     walls
@@ -60,7 +60,7 @@ def read_truth(
     InputError
         A grain or wall is unknown.
     """
-    table = read_table(file, TRUTH_COLUMNS, inputs)
+    table = file if isinstance(file, Table) else read_table(file, TRUTH_COLUMNS, inputs)
     number, i = table.integers("frame") - frames.start, table.integers("i")
     frame = np.where(number % frames.step == 0, number // frames.step, -1)
     body = {int(each): row for row, each in enumerate(ids) if each >= 0}

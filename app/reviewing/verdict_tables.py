@@ -6,10 +6,14 @@ from pathlib import Path
 
 from rich.console import Console
 
+from ..experiment.reading.tables import Table
+from ..verdicts.reviewer_name import account_name
 from ..verdicts.table import export_verdicts, import_verdicts
 from .judging.candidate_pairs import find_candidate_pairs
 from .reviewed_pairs import store_forces
 from .reviewed_run import open_reviewed_run
+
+UNNAMED = "python"  # reviewer of a table in memory, where the account is no person's
 
 
 def import_table(path: Path, file: Path, *, reviewer: str | None, complete: bool) -> int:
@@ -20,17 +24,17 @@ def import_table(path: Path, file: Path, *, reviewer: str | None, complete: bool
     return 0
 
 
-def import_verdicts_of_run(path: Path, file: Path, *, reviewer: str | None, complete: bool) -> int:
+def import_verdicts_of_run(path: Path, file: Path | Table, *, reviewer: str | None, complete: bool) -> int:
     """Append a table of verdicts, or of contacts, to the log of a run; return their number.
 
     Parameters
     ----------
     path : Path
         An experiment, a run's folder or results.h5.
-    file : Path
-        Table frame,i,j[,verdict,reviewer,time,seconds].
+    file : Path or Table
+        Table frame,i,j[,verdict,reviewer,time,seconds], or its file.
     reviewer : str or None
-        Reviewer of rows that name none; default: the file's name.
+        Reviewer of rows that name none; default: the file's name, or the user's name for a table without file.
     complete : bool
         The table lists every contact of its frames: all other candidate pairs are judged no contact.
     """
@@ -38,11 +42,15 @@ def import_verdicts_of_run(path: Path, file: Path, *, reviewer: str | None, comp
     found = [find_candidate_pairs(run.results, k, run.threshold) for k in range(len(run.results.frames))]
     pairs = {each.frame: list(zip(each.contacts.i.tolist(), each.contacts.j.tolist(), strict=True)) for each in found}
     entries = import_verdicts(
-        run.log, file, run.bodies, reviewer or file.stem, first_frame=run.first_frame,
+        run.log, file, run.bodies, reviewer or _default_reviewer(file), first_frame=run.first_frame,
         frame_count=len(run.results.frames), candidates=pairs if complete else None,
     )  # fmt: skip
     store_forces(run, entries)
     return len(entries)
+
+
+def _default_reviewer(file: Path | Table) -> str:
+    return file.stem if isinstance(file, Path) else account_name() or UNNAMED
 
 
 def export_table(path: Path, file: Path) -> int:

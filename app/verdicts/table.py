@@ -30,7 +30,7 @@ def export_verdicts(log: VerdictLog, file: Path) -> int:
 
 def import_verdicts(
     log: VerdictLog,
-    file: Path,
+    file: Path | Table,
     bodies: BodyNames,
     reviewer: str,
     *,
@@ -45,8 +45,8 @@ def import_verdicts(
     log
         The log.
     file
-        Table with the columns frame, i, j, and perhaps verdict (absent: every row is a contact), reviewer, time and
-        seconds. Its frames are those of the experiment.
+        Table, or its file, with the columns frame, i, j, and perhaps verdict (absent: every row is a contact),
+        reviewer, time and seconds. Its frames are those of the experiment.
     bodies
         Names and rows of the run's bodies.
     reviewer
@@ -62,8 +62,8 @@ def import_verdicts(
     InputError
         A frame, grain, wall or verdict is unknown; nothing is written.
     """
-    present = [name for name in _OPTIONAL if name in _header(file)]
-    table = read_table(file, ("frame", "i", "j", *present))
+    present = [name for name in _OPTIONAL if name in (file.names if isinstance(file, Table) else _header(file))]
+    table = file if isinstance(file, Table) else read_table(file, ("frame", "i", "j", *present))
     rows = bodies.rows()
     frame, i = table.integers("frame"), table.integers("i")
     seconds = table.numbers("seconds") if "seconds" in present else None

@@ -88,8 +88,9 @@ def synth(
                 progress=progress,
             )
         else:
+            if photographs and preset not in ("photoelastic", *get_args(FringedPreset)):
+                raise InputError("synth", f"--preset {preset}", "makes tracks, not photographs: add --no-photographs")
             refused = {
-                "--photographs": photographs and preset not in ("photoelastic", *get_args(FringedPreset)),
                 "--frames": None if preset in get_args(FringedPreset) else frame_count,
                 "--step-degrees": step_degrees, "--pixel-size": pixel_size, "--jpeg-quality": jpeg_quality,
                 "--png": png, "--reversal": reversal, "--radius-error": radius_error,

@@ -28,6 +28,10 @@ from tests.program import rodsight
         ),
         (("run", "x", "--full-frames", "a"), "--full-frames a: is not a whole number"),
         (("synth", "x", "--seed", "1.5"), "rodsight synth: --seed 1.5: is not a whole number"),
+        (
+            ("synth", "x", "--preset", "gravity"),
+            "--preset gravity: makes tracks, not photographs: add --no-ph",
+        ),
         (("study", "worlds", "--seeds", "1", "x"), "rodsight study: --seeds x: is not a whole number"),
         (("init", "x", "--photographs", "p", "--density", "2,7 g/cm3"), "is not a number: write --density 2700.0"),
         (("run", "x", "y"), "rodsight run: y: is one argument too many"),

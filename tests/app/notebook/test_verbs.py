@@ -210,3 +210,68 @@ def test_unknown_options_are_refused(run, tmp_path):
         rodsight.export("csv", run)  # type: ignore[arg-type]
     with pytest.raises(rodsight.InputError, match="is not an option"):
         rodsight.import_table(tmp_path, tmp_path, scale=2.0)  # type: ignore[call-arg]
+
+
+@pytest.mark.parametrize("frame", [2.5, "3", [1, 2]])
+def test_what_is_no_frame_is_refused_with_its_value(run, frame):
+    for table in (run.contacts, run.grains, run.walls, run.graph, lambda frame: run.figure("forces", frame)):
+        with pytest.raises(rodsight.InputError, match=f"^frame: {re.escape(repr(frame))}: is not a whole number"):
+            table(frame)
+    with pytest.raises(rodsight.InputError, match=r"^frame: "):
+        rodsight.what_if(run, frame)
+    assert len(run.contacts(np.int64(1))) == len(run.contacts(1))
+
+
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [
+        ({"pressure": 5e4}, "pressure: 50000.0: is no mapping of walls to pascals"),
+        ({"pressure": {"top": "5e4"}}, "pressure: top = '5e4'"),
+        ({"precision": "1e-5"}, "precision: '1e-5'"),
+        ({"settings": 3}, "settings: 3: is no mapping of keys to values"),
+        ({"settings": {"solver.kappa": object}}, "settings['solver.kappa']: <class 'object'>"),
+        ({"material": [0.25]}, "material: [0.25]: is no mapping of keys to values"),
+        ({"walls": 4}, "walls: int: is neither a data frame nor a mapping of columns"),
+        ({"walls": {"frame": [0], "wall": ["top", "left"]}}, "walls: is no table"),
+        ({"boundary": 7}, "boundary: 7: must be ids"),
+    ],
+)
+def test_arguments_of_another_kind_are_refused_with_their_value(made_tracks, given, named):
+    tracks = pd.read_csv(made_tracks / "tracks.csv").merge(pd.read_csv(made_tracks / "grains.csv"), on="id")
+    arguments = {"walls": pd.read_csv(made_tracks / "walls.csv"), "pressure": {"top": 5e4}} | given
+    with pytest.raises(rodsight.InputError) as refused:
+        rodsight.solve(tracks, **arguments)
+    assert named in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [
+        ({"forbid": [0, 1]}, "what_if: forbid = [0, 1]: 0 is no pair of bodies"),
+        ({"force": [(0, 1, 2)]}, "force = [(0, 1, 2)]: (0, 1, 2) is no pair"),
+        ({"forbid": 3}, "forbid = 3: is no list of pairs"),
+        ({"forbid": [(0, [1])]}, "[1] is neither a grain's id nor a wall's name"),
+        ({"move": [(0, 1.0)]}, "move: [(0, 1.0)]: is no mapping of ids to displacements"),
+        ({"move": {0: 1e-5}}, "move = {0: 1e-05}"),
+        ({"friction": "rough"}, "friction = 'rough': is not a coefficient"),
+    ],
+)
+def test_bodies_that_are_none_are_refused_with_their_value(run, given, named):
+    with pytest.raises(rodsight.InputError) as refused:
+        rodsight.what_if(run, 1, local="move" in given, **given)
+    assert named in str(refused.value)
+
+
+def test_a_table_of_verdicts_in_memory_has_its_own_name_and_the_user_as_reviewer(made_tracks, tmp_path, monkeypatch):
+    made = rodsight.run(made_tracks, out=tmp_path / "run", settings=FEW)
+    pair = made.contacts(1).query("j >= 0")[["frame", "i", "j"]].head(1)
+    for wrong, named in (
+        (pair.assign(i=999), "verdicts: row 0, i = '999'"),
+        (pair.drop(columns="j"), "verdicts: column j"),
+    ):
+        with pytest.raises(rodsight.InputError, match=f"^{re.escape(named)}"):
+            rodsight.review(made, wrong)
+    with pytest.raises(rodsight.InputError, match=r"^truth: row 0, i = '999'"):
+        rodsight.score(made, pair.assign(i=999, fn=1.0, ft=0.0))
+    monkeypatch.setattr("getpass.getuser", lambda: "ada")
+    assert rodsight.review(made, pair)["reviewer"].tolist() == ["ada"]

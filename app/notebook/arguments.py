@@ -1,0 +1,82 @@
+"""Arguments given in Python: checked, and converted to tables and to the strings of `--set`."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Iterable, Mapping, Sequence
+from numbers import Real
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import tomli_w
+
+from ..experiment.reading.tables import Table
+from ..process.errors import InputError
+
+OPTIONAL = "theta"  # column whose values may be NaN
+WHOLE = ("frame", "id")  # columns of whole numbers, which data frames may store as floats
+
+
+def as_strings(settings: Mapping[str, object], name: str = "settings") -> list[str]:
+    """Return KEY=VALUE of every setting, the value as TOML. Raises InputError; name: of the argument."""
+    given = as_mapping(name, settings, 'keys to values, such as {"solver.kappa": 0.1}')
+    return [f"{key}={_as_toml(f'{name}[{key!r}]', value)}" for key, value in given.items()]
+
+
+def _as_toml(where: str, value: object) -> str:
+    if isinstance(value, np.generic):
+        value = value.item()
+    try:
+        return tomli_w.dumps({"value": value}).partition("=")[2].strip()
+    except TypeError:
+        raise InputError(where, repr(value), "is no value of a key of experiment.toml") from None
+
+
+def as_mapping(name: str, value: object, content: str) -> Mapping[Any, Any]:
+    """Return a mapping. Raises InputError with the argument; content: of it in words, with an example."""
+    if not isinstance(value, Mapping):
+        raise InputError(name, repr(value), f"is no mapping of {content}")
+    return value
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is a finite number."""
+    return isinstance(value, Real) and math.isfinite(value)
+
+
+def as_whole(name: str, value: object) -> int:
+    """Return a whole number. Raises InputError with the argument."""
+    try:
+        return operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise InputError(name, repr(value), "is not a whole number") from None
+
+
+def as_frame(name: str, columns: object) -> pd.DataFrame:
+    """Return columns as a data frame. Raises InputError where they are none, or of unequal lengths."""
+    if not isinstance(columns, pd.DataFrame | Mapping):
+        raise InputError(name, f"{type(columns).__name__}", "is neither a data frame nor a mapping of columns")
+    try:
+        return pd.DataFrame(columns)
+    except ValueError as error:
+        raise InputError(name, "", f"is no table: {error}") from None
+
+
+def as_table(name: str, frame: pd.DataFrame, columns: Sequence[str]) -> Table:
+    """Convert columns to a table as read from a file, for the same checks and messages."""
+    for column in columns:
+        if column not in frame:
+            raise InputError(name, f"column {column}", f"there is no such column among {', '.join(map(str, frame))}")
+    if frame.empty:
+        raise InputError(name, "", "has no rows")
+    return Table(Path(name), {column: _texts(column, frame[column]) for column in columns}, list(range(len(frame))))
+
+
+def _texts(column: str, values: Iterable[Any]) -> list[str]:
+    array = np.asarray(values)
+    if column in WHOLE and array.dtype.kind == "f" and np.all(array == np.floor(array)):
+        array = array.astype(np.int64)
+    return ["" if column == OPTIONAL and each != each else str(each) for each in array.tolist()]  # NaN: unknown
