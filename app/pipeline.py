@@ -24,7 +24,7 @@ from .experiment.experiment import POSE_COLUMNS, checksums, load_experiment, rea
 from .experiment.photographs import PrefetchedPhotographs
 from .experiment.plausibility import check_packing
 from .experiment.scaling import make_scale
-from .experiment.walls import read_walls
+from .experiment.walls import describe_walls_at_rest, read_walls
 from .out_of_date import out_of_date
 from .process.atomic import write_atomically
 from .process.errors import InputError
@@ -73,6 +73,7 @@ def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
         walls = read_walls(experiment, count)
         ids = guess.id if guess is not None else None
         read_corrections(experiment, ids, count)
+    run.notes.extend(describe_walls_at_rest(experiment, count))
     run.frame_range(count)
     for name, columns in ((experiment.config.truth, TRUTH_COLUMNS), (experiment.config.truth_tracks, POSE_COLUMNS)):
         if name is not None:

@@ -127,14 +127,18 @@ def _no_walls(experiment: Experiment, frame_count: int) -> WallTracks:
 def arrange_walls(table: Table, frame_count: int, *, followed: bool = False) -> tuple[tuple[str, ...], Array]:
     """Return names (w,) and endpoints (f, w, 2, 2) [m] from a table frame,wall,x1,y1,x2,y2.
 
-    followed: frame 0 is enough, and endpoints are NaN where the table has no row.
+    A wall that is given in frame 0 alone does not move. followed: frame 0 is enough, and endpoints are NaN where the
+    table has no row.
     """
     frame, names, row = _named_rows(table)
     found = int(frame.max()) + 1 if followed and frame.min() == 0 else check_frames(table, frame)
-    if found > frame_count or not followed:
+    if found > frame_count or (found > 1 and not followed):
         check_frame_count(table, "walls", found, frame_count)
     endpoints = np.full((frame_count, len(names), 2, 2), np.nan)
     endpoints[frame, row] = np.column_stack([table.numbers(c) for c in WALL_COLUMNS[2:]]).reshape(-1, 2, 2)
+    if not followed:
+        still = _given_in_frame_0_alone(frame, row, len(names))
+        endpoints[:, still] = endpoints[0, still]
     absent = np.argwhere(np.isnan(endpoints[: 1 if followed else None, :, 0, 0]))
     if len(absent):
         raise InputError(table.file, f"frame {absent[0][0]}", f"has no row of wall {names[absent[0][1]]!r}")
@@ -142,6 +146,31 @@ def arrange_walls(table: Table, frame_count: int, *, followed: bool = False) -> 
     if len(point):
         raise table.error(int(point[0]), "wall", "has no length: its two ends are the same point")
     return names, endpoints
+
+
+def describe_walls_at_rest(experiment: Experiment, frame_count: int) -> list[str]:
+    """Name the bars that are taken as at rest because the table gives them in frame 0 alone, in a sentence; or none."""
+    section = experiment.config.walls
+    if section is None or section.file is None or frame_count < 2:
+        return []
+    frame, names, row = _named_rows(experiment.table(section.file, WALL_COLUMNS))
+    still = [names[w] for w in np.flatnonzero(_given_in_frame_0_alone(frame, row, len(names))).tolist()]
+    if not still or _follows_bars(experiment, section, frame):
+        return []
+    return [f"{section.file} gives {', '.join(still)} in frame 0 alone: taken as at rest in all {frame_count} frames."]
+
+
+def _given_in_frame_0_alone(frame: NDArray[np.int64], row: NDArray[np.int64], count: int) -> NDArray[np.bool_]:
+    last = np.full(count, -1, np.int64)
+    np.maximum.at(last, row, frame)
+    return last == 0
+
+
+def _follows_bars(experiment: Experiment, section: WallsSection, frame: NDArray[np.int64]) -> bool:
+    """Whether bars are tracked in photographs; frame: of every row of their table."""
+    if section.track is None:
+        return experiment.config.photographs is not None and not np.any(frame > 0)
+    return section.track
 
 
 def arrange_arcs(
@@ -232,8 +261,7 @@ def arrange_loads(table: Table, names: tuple[str, ...], frame_count: int, pressu
 def _read_bars(
     experiment: Experiment, section: WallsSection, frame_count: int
 ) -> tuple[tuple[str, ...], Array, NDArray[np.int8]]:
-    track = section.track
-    if track and experiment.config.photographs is None:
+    if section.track and experiment.config.photographs is None:
         raise InputError(experiment.file, "key walls.track = true", "walls can be tracked in photographs only")
     if section.file is None and section.corners is not None and section.arcs is None:
         table = experiment.table(section.corners, CORNER_COLUMNS, optional=("theta",))
@@ -243,9 +271,8 @@ def _read_bars(
     if section.file is None:
         return (), np.empty((frame_count, 0, 2, 2)), np.empty(0, np.int8)
     table = experiment.table(section.file, WALL_COLUMNS)
-    if track is None:
-        track = experiment.config.photographs is not None and not np.any(table.integers("frame") > 0)
-    names, endpoints = arrange_walls(table, frame_count, followed=track)
+    followed = _follows_bars(experiment, section, table.integers("frame"))
+    names, endpoints = arrange_walls(table, frame_count, followed=followed)
     return names, endpoints, np.full(len(names), STRAIGHT, np.int8)
 
 

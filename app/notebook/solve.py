@@ -62,7 +62,8 @@ def solve(
         or NaN where it is unknown. A grain without a row in a frame is lost there. Without times frames are one second
         apart, which matters only where inertia does.
     walls : data frame or mapping of columns, optional
-        Columns frame, wall, x1, y1, x2, y2 [m]; the packing is to the left of 1 → 2.
+        Columns frame, wall, x1, y1, x2, y2 [m]; the packing is to the left of 1 → 2. A wall given in frame 0
+        alone does not move.
     material : mapping, optional
         Keys of the section [material] of experiment.toml (density, length, friction, …), with its defaults.
     arcs : data frame or mapping of columns, optional

@@ -4,6 +4,8 @@ import os
 from pathlib import Path
 
 import pytest
+from rodsight.experiment.experiment import load_experiment
+from rodsight.experiment.walls import describe_walls_at_rest, read_walls
 
 from tests.app.experiment.tables import edit, scale_radii, swap_row
 from tests.program import refuse, rodsight
@@ -112,3 +114,19 @@ def test_an_experiment_without_walls_can_be_tracked_but_not_solved(tracked, tmp_
     edit(tracked / TOML, 'truth = "truth_contacts.csv"\n', "")
     assert "walls" in refuse(capsys, tmp_path / "out", "run", str(tracked))
     assert rodsight("track", str(tracked), "--out", str(tmp_path / "out"), "--quiet") == 0
+
+
+def test_walls_given_in_frame_0_alone_are_at_rest_and_named(tracked, capsys):
+    experiment = load_experiment(tracked)
+    moving = read_walls(experiment, 5)
+    assert describe_walls_at_rest(experiment, 5) == []
+    head, *rows = (tracked / WALLS).read_text().splitlines()
+    for kept, still in ((rows[:4], moving.name), ([r for r in rows if r[0] == "0" or ",left," not in r], ("left",))):
+        (tracked / WALLS).write_text("\n".join([head, *kept]) + "\n")
+        found = read_walls(load_experiment(tracked), 5)
+        for w, name in enumerate(found.name):
+            first = name in still
+            assert (found.endpoints[:, w] == moving.endpoints[: 1 if first else None, moving.name.index(name)]).all()
+        assert rodsight("check", tracked, "--no-budget") == 0
+        words = f"walls.csv gives {', '.join(still)} in frame 0 alone: taken as at rest in all 5 frames."
+        assert words in " ".join(capsys.readouterr().out.split())
