@@ -54,7 +54,8 @@ def main(arguments: list[str] | None = None) -> None:
     except MemoryError:
         status = _report("out of memory: use fewer frames (--frames A:B)", 1)
     except OSError as error:
-        status = _report(_describe(error), 1)
+        file = _file_instead_of_folder(error)
+        status = _report(_describe(error), 1) if file is None else _report(f"{file}: is a file, not a folder", 2)
     sys.exit(status)
 
 
@@ -93,6 +94,16 @@ def _discard_output() -> None:
     with suppress(OSError, ValueError):
         null = os.open(os.devnull, os.O_WRONLY)
         os.dup2(null, sys.stdout.fileno())
+
+
+def _file_instead_of_folder(error: OSError) -> str | None:
+    """Return the file that stands where a folder is to be made, perhaps above it; None: another error."""
+    if not isinstance(error, FileExistsError | NotADirectoryError) or not isinstance(error.filename, str):
+        return None
+    place = os.path.abspath(error.filename)
+    while not os.path.lexists(place):
+        place = os.path.dirname(place)
+    return place if os.path.isfile(place) else None
 
 
 def _describe(error: OSError) -> str:

@@ -1,4 +1,4 @@
-"""Errors of the operating system end a command with one line and exit status 1."""
+"""Errors of the operating system end a command with one line, and exit status 1 unless an argument causes them."""
 
 from __future__ import annotations
 
@@ -29,10 +29,16 @@ def test_a_file_that_cannot_be_written_is_one_line(tracked, tmp_path, capsys, mo
     assert not (tmp_path / "out" / "results.h5").exists()
 
 
-def test_a_folder_that_is_a_file_is_one_line(tracked, tmp_path, capsys):
+@pytest.mark.parametrize("command", ["solve", "campaign"])
+def test_a_folder_that_is_a_file_is_one_line(command, tracked, tmp_path, capsys):
     (tmp_path / "out").write_text("mine")
-    assert rodsight("solve", tracked, "--out", tmp_path / "out", *FEW) == 1
-    assert capsys.readouterr().err.count("\n") == 1
+    table = tmp_path / "table.csv"
+    table.write_text(f"experiment\n{tracked}\n")
+    given = (tracked, *FEW) if command == "solve" else (table,)
+    assert rodsight(command, *given, "--out", tmp_path / "out") == 2
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    assert f"{tmp_path / 'out'}: is a file, not a folder" in line
     assert (tmp_path / "out").read_text() == "mine"
 
 
