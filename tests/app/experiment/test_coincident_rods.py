@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 import rodsight
 from rodsight.experiment.coincident_rods import refuse_coincident_rods
+from rodsight.experiment.experiment import load_experiment, read_grain_guess
 from rodsight.process.errors import InputError
 
 from tests.app.experiment.tables import edit
@@ -84,3 +85,12 @@ def test_tables_of_a_cell_are_examined_across_its_edges(tmp_path, capsys):
     folder = in_cell(tmp_path)
     edit(folder / "tracks.csv", "1,5,0.11,0.01,0", "1,5,0.13,0.01,0")  # the cell is 0.12 m wide: rod 0 is at 0.01
     assert "cell.csv: frame 1: grains 0 and 5" in refuse(capsys, tmp_path / "out", "run", str(folder))
+
+
+def test_two_rods_marked_at_one_place_of_the_first_photograph_are_refused(tmp_path):
+    (tmp_path / "experiment.toml").write_text(
+        'name = "marked"\n[photographs]\nfiles = "*.png"\npixel_size = 1e-4\ninterval = 30.0\ngrains = "grains.csv"\n'
+    )
+    (tmp_path / "grains.csv").write_text("id,x,y,radius\n3,100,100,40\n4,180,100,40\n5,101,101,40\n")
+    with pytest.raises(InputError, match=r"grains\.csv: frame 0: the centres of grains 3 and 5 are 0\.035 of a radius"):
+        read_grain_guess(load_experiment(tmp_path))
