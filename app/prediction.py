@@ -13,6 +13,7 @@ from .experiment.config.experiment_file import ExperimentFile
 from .experiment.experiment import Experiment, GrainGuess, read_grain_guess
 from .inference.diagnosis.data_quality import DataQuality, measure_data_quality
 from .inference.diagnosis.diagnose import diagnose
+from .inference.diagnosis.smoothed_tracks import EXPECTED_OF_SMOOTHED, LOW_OF_SMOOTHED
 from .inference.diagnosis.trial import PREDICTED_PHOTOGRAPHS, Trial, solve_trial
 from .inference.inference_settings import material_of, settings_of
 from .inference.inputs import Inputs
@@ -61,11 +62,13 @@ class Prediction:
     def expected(self) -> tuple[float, float, float]:
         """Expected r(f_n), and an interval with a coverage of two thirds; NaN where there is no trial.
 
-        With too few photographs all are limited as the trust of the run is.
+        With too few photographs, or smoothed tracks, it is limited as the trust of the run is.
         """
         if self.trial is None:
             return NO_EXPECTATION
         r, low, high = self.trial.expect(contradicted=any(each.cause not in CORRECTED for each in self.diagnosis))
+        if any(each.cause == "smoothed_tracks" for each in self.diagnosis):  # estimates share its errors
+            r, low = min(r, EXPECTED_OF_SMOOTHED), min(low, LOW_OF_SMOOTHED)
         most = TRUST_OF_FEW if describe_few_photographs(self.trial.photographs) else 1.0
         return min(r, most), min(low, most), min(high, most)
 

@@ -28,6 +28,7 @@ from ..solver.statistics.frame_statistics import FrameStatistics
 from .corrected_sequence import CorrectedSequence
 from .correction.correct_sequence import correct_sequence
 from .correction.friction import check_sequence_friction
+from .diagnosis.smoothed_tracks import find_smoothing, limit_for_smoothing
 from .first_frame import estimate_first_frame
 from .frame_store import FrameStore, MemoryStore
 from .inputs import Inputs
@@ -83,10 +84,13 @@ def infer_sequence(
     frames, statistics = _with_first_frame(sequence, frames, statistics, observer)
     check = check_sequence_friction(sequence, frames)
     count, measured = len(frames), sequence.friction_measured
-    assessed = LazySequence(
-        count,
-        lambda k: limit_for_few_photographs(penalise_friction(frames[k], check, measured=measured), count),
-    )
+    smoothed = find_smoothing(inputs.tracks) is not None
+
+    def assess(k: int) -> FrameForces:
+        frame = limit_for_few_photographs(penalise_friction(frames[k], check, measured=measured), count)
+        return limit_for_smoothing(frame) if smoothed else frame
+
+    assessed = LazySequence(count, assess)
     widened = LazySequence(count, lambda k: _widen_statistics(sequence, statistics[k], assessed[k], check))
     kinematics = _measure_kinematics(sequence)
     return replace(

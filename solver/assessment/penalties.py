@@ -108,12 +108,17 @@ def limit_for_few_photographs(frame: FrameForces, count: int) -> FrameForces:
         Photographs of the whole test.
     """
     words = describe_few_photographs(count)
-    if not words or not frame.trust > TRUST_OF_FEW:
+    return limit_trust(frame, TRUST_OF_FEW, TRUST_OF_FEW, words) if words else frame
+
+
+def limit_trust(frame: FrameForces, most: float, expected: float, words: str) -> FrameForces:
+    """Limit trust and expected correlation for a reason, stated first; frames of less trust stay as they are."""
+    if not frame.trust > most:
         return frame
     return replace(
         frame,
-        trust=TRUST_OF_FEW,
-        expected_correlation=min(frame.expected_correlation, TRUST_OF_FEW),
+        trust=most,
+        expected_correlation=min(frame.expected_correlation, expected),
         trust_penalties="; ".join(filter(None, (words, frame.trust_penalties))),
     )
 

@@ -25,6 +25,11 @@ CAUSES: dict[str, Cause] = {
     "photograph_repeated": Cause(
         "no motion leads to the second of both, and its forces rest on the positions alone", "leave one of them out"
     ),
+    "smoothed_tracks": Cause(
+        "sudden motion is spread over several photographs, and errors that they share seem to be knowledge: forces err "
+        "more than they seem to",
+        "give the tracks as measured: a run treats their noise itself",
+    ),
     "rotation_sign": Cause("rolling is taken for sliding", "give theta counter-clockwise with y up: change its sign"),
     "rotation_in_degrees": Cause("rolling is taken for sliding", "give theta in radians"),
     "rotation_zero": Cause(

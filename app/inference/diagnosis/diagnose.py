@@ -36,6 +36,7 @@ from .distortion import seeks_distortion, undistorted
 from .resistance import examine_resistance
 from .rivals import rivals_of
 from .sections import examine_sections
+from .smoothed_tracks import examine_smoothing
 from .trial import TRIAL_PHOTOGRAPHS, Trial, select_window, solve_trial, trial_score
 from .wall_times import examine_wall_times
 
@@ -87,7 +88,7 @@ def diagnose(
     if len(failed) == inputs.tracks.frame_count:
         return []
     tracks, walls, camera = undistorted(inputs, walls, failed, camera=not undisturbed)
-    found = [*examine_rotations(tracks, walls), *examine_order(tracks)]
+    found = [*examine_rotations(tracks, walls), *examine_order(tracks), *examine_smoothing(inputs.tracks)]
     found += examine_walls(tracks, walls) or examine_wall_times(tracks, walls) or examine_wall_places(tracks, walls)
     found += examine_sizes(tracks, walls) or examine_sections(tracks)
     found += examine_inertia(tracks, walls, inputs.material)

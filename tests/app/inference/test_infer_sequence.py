@@ -13,6 +13,7 @@ from rodsight.experiment.experiment import load_experiment
 from rodsight.inference import infer_sequence as inference
 from rodsight.inference import solve_frames as solving
 from rodsight.inference.correction import correct_sequence as correct_module
+from rodsight.inference.diagnosis.smoothed_tracks import EXPECTED_OF_SMOOTHED, SMOOTHED, TRUST_OF_SMOOTHED
 from rodsight.inference.frame_store import MemoryStore
 from rodsight.inference.infer_sequence import infer_sequence
 from rodsight.inference.inputs import Inputs
@@ -25,6 +26,7 @@ from rodsight.solver.contacts.contacts import ContactSource
 from rodsight.solver.frame_forces import FrameForces, FrameStatus
 from rodsight.synthetic.scenarios.scenario_folder import make_scenario
 
+from tests.app.inference.diagnosis.test_smoothed_tracks import moving_average
 from tests.app.inference.scenarios import read_inputs
 
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
@@ -62,6 +64,17 @@ def test_the_friction_check_widens_the_intervals_of_every_frame(contradicted):
         assert after.trust == before.trust <= after.expected_correlation  # the frame's own evidence decides
         assert "the motion fits a friction of" in after.trust_penalties
         assert (after.fn_sd >= before.fn_sd).all()
+
+
+def test_every_frame_of_smoothed_tracks_is_trusted_less(contradicted):
+    inputs, as_measured = contradicted
+    assert max(each.trust for each in as_measured.frames) > TRUST_OF_SMOOTHED + 0.2
+    tracks = replace(inputs.tracks, position=moving_average(inputs.tracks.position, 5))
+    walls = replace(inputs.walls, endpoints=moving_average(inputs.walls.endpoints, 5))
+    results = infer_sequence(replace(inputs, tracks=tracks, walls=walls))
+    assert all(each.trust <= TRUST_OF_SMOOTHED for each in results.frames)
+    assert all(each.expected_correlation <= EXPECTED_OF_SMOOTHED for each in results.frames)
+    assert SMOOTHED in results.frames[4].trust_penalties
 
 
 @pytest.mark.thorough

@@ -23,3 +23,12 @@ def test_another_friction_is_named_unless_the_forces_fit_the_given_one(monkeypat
     monkeypatch.setattr(prediction, "diagnose", lambda *_: found)
     predicted = prediction.predict_accuracy(None, None, SimpleNamespace())  # type: ignore[arg-type]
     assert [each.cause for each in predicted.diagnosis] == named
+
+
+def test_nothing_better_is_expected_of_smoothed_tracks_than_of_others() -> None:
+    """Their estimates agree, as they share the errors."""
+    trial = SimpleNamespace(expect=lambda *, contradicted: (0.98, 0.96, 0.99), stride=1, photographs=12)
+    found = finding("smoothed_tracks", "alike"), finding("inertia", "fast")
+    smoothed, other = (prediction.Prediction(None, trial, diagnosis=(each,)) for each in found)  # type: ignore[arg-type]
+    assert smoothed.expected == (0.9, 0.79, 0.99)
+    assert other.expected == (0.98, 0.96, 0.99)
