@@ -2,21 +2,31 @@
 
 Gaps of touching hard grains vary about zero by noise and errors, to both sides alike. Gaps of soft grains are all
 overlaps, with a mean that equals their standard deviation: forces are distributed nearly as exp(−f / ⟨f⟩). A wrong
-scale, or an error that all radii share, shifts the gaps without increasing their variance.
+scale, or an error that all radii share, shifts the gaps without increasing their variance. Radii of some grains that
+are stated too large make overlaps alone as well, but those of one grain are all alike.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import lsqr
+
 from ..bodies.motion import Snapshot
 from ..bodies.packing import Packing
+from ..contacts.pairs import split_keys
 from ..detection.precision import measure_precision
-from ..posterior.sequence_evidence import gather_position_evidence
+from ..posterior.sequence_evidence import SequenceEvidence, gather_position_evidence
 
 MIN_OVERLAP = 2.5  # overlap over the noise of a position: below it calibration cannot correct it away
 OVERLAP_RATIO = (0.5, 2.5)  # mean overlap over the gaps' standard deviation; hard packings: up to .2 above MIN_OVERLAP
 MIN_SD = 1.2  # standard deviation of the gaps over the noise of a gap
+# Variance of overlaps that no errors of single grains explain, over all: .33 to 1.1 of soft grains, .01 to .09 where
+# radii are wrong.
+LEAST_OF_PAIRS = 0.2
+FEWEST_PAIRS = 20  # more than grains, which such errors could explain by chance
 
 
 def find_soft_overlap(packing: Packing, snapshots: Sequence[Snapshot]) -> float:
@@ -25,7 +35,7 @@ def find_soft_overlap(packing: Packing, snapshots: Sequence[Snapshot]) -> float:
     Notes
     -----
     With o and s the mean overlap and standard deviation of touching gaps, σ the noise of a position, o' the overlap by
-    `measure_precision`: soft if o' ≥ 2.5 σ, 0.5 s < o < 2.5 s and s > 1.2 √2 σ.
+    `measure_precision`: soft if o' ≥ 2.5 σ, 0.5 s < o < 2.5 s, s > 1.2 √2 σ, and `fraction_of_pairs` is not small.
     """
     found = measure_precision(packing.grains, snapshots)
     if found is None or found.overlap < MIN_OVERLAP * found.sigma:
@@ -37,4 +47,24 @@ def find_soft_overlap(packing: Packing, snapshots: Sequence[Snapshot]) -> float:
     overlap, sd = -evidence.touching.offset, evidence.touching.sd
     noise = 2.0**0.5 * found.sigma
     soft = OVERLAP_RATIO[0] * sd < overlap < OVERLAP_RATIO[1] * sd and sd > MIN_SD * noise
-    return overlap if soft else 0.0
+    return overlap if soft and fraction_of_pairs(evidence) >= LEAST_OF_PAIRS else 0.0
+
+
+def fraction_of_pairs(evidence: SequenceEvidence) -> float:
+    """Fraction of the variance of overlaps that errors of single grains do not explain; 1 where pairs are too few.
+
+    Notes
+    -----
+    With δ_ij the mean overlaps, c pairs and n grains: min_e Σ (δ_ij − e_i − e_j)²/(c − n) over the variance of δ_ij.
+    """
+    count = evidence.packing.grains.count
+    i, j = split_keys(evidence.key, count + len(evidence.packing.pressure))
+    gap = np.nansum(evidence.gap, axis=0) / np.maximum(np.isfinite(evidence.gap).sum(axis=0), 1)  # 0: never near
+    rows = np.flatnonzero((j < count) & (gap < 0.0))
+    pair, grain = np.tile(np.arange(len(rows)), 2), np.concatenate([i[rows], j[rows]])
+    spare = len(rows) - len(np.unique(grain))
+    if spare < FEWEST_PAIRS:
+        return 1.0
+    errors = csr_array((np.ones(len(grain)), (pair, grain)), shape=(len(rows), count))
+    rest = gap[rows] - errors @ lsqr(errors, gap[rows])[0]
+    return float(rest @ rest / spare / np.var(gap[rows]))

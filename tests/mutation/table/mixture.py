@@ -75,5 +75,8 @@ MUTANTS = [
         f"{TESTS}/test_soft_grains.py",
         ("-evidence.touching.offset, evidence", "evidence.touching.offset, evidence"),
         ("sd > MIN_SD * noise", "True"),
+        ("soft and fraction_of_pairs(evidence) >= LEAST_OF_PAIRS", "soft"),
+        ("(j < count) & (gap < 0.0)", "j < count"),
+        ("if spare < FEWEST_PAIRS:", "if False:"),
     ),
 ]

@@ -8,7 +8,9 @@ import numba
 import numpy as np
 import pytest
 from rodsight.solver.bodies.grains import Grains
-from rodsight.solver.mixture.soft_grains import find_soft_overlap
+from rodsight.solver.contacts.pairs import split_keys
+from rodsight.solver.mixture.soft_grains import FEWEST_PAIRS, LEAST_OF_PAIRS, find_soft_overlap, fraction_of_pairs
+from rodsight.solver.posterior.sequence_evidence import gather_position_evidence
 
 from tests.solver.posterior.simulated import NOISE, SimulatedShear, simulate_shear
 
@@ -31,11 +33,15 @@ def test_soft_grains_are_found_and_hard_ones_are_not(hard, soft) -> None:
     assert find_soft_overlap(soft.packing, soft.snapshots) > 1e-4
 
 
-@pytest.mark.parametrize("error", ["radii", "all radii alike"])
+@pytest.mark.parametrize("error", ["radii", "all radii alike", "a fifth too large"])
 def test_wrong_radii_of_hard_grains_are_no_softness(hard, error) -> None:
     rng = np.random.default_rng(1)
     radius = hard.packing.grains.radius
-    wrong = radius * (1.0 + 0.01 * rng.normal(size=len(radius))) if error == "radii" else radius + 2.5e-4
+    wrong = {
+        "radii": radius * (1.0 + 0.01 * rng.normal(size=len(radius))),
+        "all radii alike": radius + 2.5e-4,
+        "a fifth too large": radius * (1.0 + 0.02 * (rng.random(len(radius)) < 0.2)),
+    }[error]
     packing = replace(hard.packing, grains=Grains.of_rods(wrong, density=2700.0, length=0.06))
     assert find_soft_overlap(packing, hard.snapshots) == 0.0
 
@@ -46,3 +52,15 @@ def test_an_overlap_without_variance_of_its_own_is_no_softness(hard) -> None:
         hard.packing, grains=Grains.of_rods(hard.packing.grains.radius + 1.2 * NOISE, density=2700.0, length=0.06)
     )
     assert find_soft_overlap(packing, hard.snapshots) == 0.0
+
+
+def test_overlaps_of_pairs_are_distinguished_from_errors_of_grains(soft) -> None:
+    evidence = gather_position_evidence(soft.packing, soft.snapshots)
+    assert fraction_of_pairs(evidence) > 1.5 * LEAST_OF_PAIRS
+    count = soft.packing.grains.count
+    i, j = split_keys(evidence.key, count + len(soft.packing.pressure))
+    own = np.append(np.random.default_rng(2).random(count), np.zeros(len(soft.packing.pressure)))
+    of_grains = replace(evidence, gap=np.broadcast_to(-own[i] - own[j], evidence.gap.shape))
+    assert fraction_of_pairs(of_grains) < 1e-6
+    few = replace(evidence, gap=np.where(np.arange(len(i)) < FEWEST_PAIRS, evidence.gap, np.nan))
+    assert fraction_of_pairs(few) == 1.0
