@@ -43,3 +43,4 @@ class Evidence:
     # Relative standard deviation of the sums of f_n among the members, where weight alone sets the scale; else NaN.
     scale_disagreement: float = math.nan
     inertial_number: float = math.nan  # of the step by the times of its photographs; NaN: no load is stated
+    corrected_gap: float = 0.0  # [m] rms part of a gap that was corrected as errors of single grains

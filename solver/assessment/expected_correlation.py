@@ -21,7 +21,7 @@ MEASURES: dict[str, Callable[[Evidence], float]] = {
     "disagreement_of_estimates": lambda e: 1.0 - e.agreement,
     # positions may err alone: one confirmation of the motion estimate is enough
     "disagreement_with_either": lambda e: 1.0 - float(np.fmax(e.agreement, e.overlap_agreement)),
-    "correction": lambda e: e.correction,
+    "correction": lambda e: unexplained_correction(e),
     "previous_residual": lambda e: e.old_unbalance,
     "disagreement_of_members": lambda e: e.disagreement,
     "gap_error": lambda e: e.information.gap_error / e.information.diameter,
@@ -41,11 +41,14 @@ MEASURES: dict[str, Callable[[Evidence], float]] = {
 # Where nothing slides, these are small for want of motion, which is no evidence for the forces: estimates that know the
 # balance of forces alone agree, too.
 BY_SLIDING = frozenset({
-    "disagreement_of_estimates", "disagreement_with_either", "disagreement_of_members", "force_change", "power_gap",
+    "correction", "disagreement_of_estimates", "disagreement_with_either", "disagreement_of_members", "force_change",
+    "power_gap",
 })  # fmt: skip
+CORRECTED_NOISE = 1.2  # ε of a motion that is noise: at most 1.14 in simulated packings at rest with right input
 MOSTLY_OVERLAPS = 0.5  # weight of the position-only estimate of soft grains above which only its evidence counts
 CONTRADICTED: float = FITTED["expected_correlation"]["contradicted"]  # change of a prediction where a cause is named
 WIDEST: float = FITTED["expected_correlation"]["widest_gap_error"]  # gap error that simulated frames have reached
+CLOSED: float = FITTED["expected_correlation"]["closed_overlap"]  # at which r is half of what other evidence shows
 BEST_EIGHTH = 1  # knot of a table: quantiles of the frames of the fit, an eighth apart
 LEAST = 1e-4  # of a measure: its logarithm is taken
 LEAST_SIGNAL = 1e-2  # of sliding over its noise, below which no sliding is seen
@@ -69,9 +72,9 @@ def expect_correlation(evidence: Evidence) -> float:
     r = tanh(max(b + Σ h_j(ln x_j), least)) with non-increasing, piecewise linear h_j of the measures x_j, fitted on
     simulated packings (fitted.toml). A measure that is not known adds nothing; `least` belongs to the worst evidence
     that was fitted, beyond which nothing is known. What speaks for the forces by BY_SLIDING counts in proportion to the
-    sliding over its noise, up to one.
+    sliding over its noise, up to one. r is multiplied by x_0/(x_0 + x), x the `closed_overlap`.
     """
-    return max(math.tanh(correlation_score(evidence)), 0.0)
+    return max(math.tanh(correlation_score(evidence)), 0.0) * _shown_fraction(evidence)
 
 
 def bound_correlation(evidence: Evidence) -> float:
@@ -86,7 +89,7 @@ def bound_correlation(evidence: Evidence) -> float:
     had read, and worse the others. Where the gap error x exceeds the greatest one x_0 that was fitted, nothing is known
     of r, and T is multiplied by x_0/x.
     """
-    return _bound(correlation_score(evidence), evidence) * _known_fraction(evidence)
+    return _bound(correlation_score(evidence), evidence) * _known_fraction(evidence) * _shown_fraction(evidence)
 
 
 def predict_correlation(evidence: Sequence[Evidence], *, contradicted: bool = False) -> tuple[float, float, float]:
@@ -114,10 +117,11 @@ def predict_correlation(evidence: Sequence[Evidence], *, contradicted: bool = Fa
         known = [_logarithm(each, x) for x in map(MEASURES[name], evidence) if not math.isnan(x)]
         if known:
             value = float(np.interp(np.mean(known), np.log(each["at"]), each["value"]))
-            score += _as_far_as_seen(name, value, float(np.mean([_seen_sliding(e) for e in evidence])))
+            score += _as_far_as_seen(name, value, float(np.mean([fraction_seen(e) for e in evidence])))
     score += CONTRADICTED if contradicted else 0.0
     score, sd = max(score, float(table["least"])), float(table["sd"])
-    r, low, high = (max(math.tanh(each), 0.0) for each in (score, score - sd, score + sd))
+    shown = float(np.mean([_shown_fraction(each) for each in evidence]))
+    r, low, high = (shown * max(math.tanh(each), 0.0) for each in (score, score - sd, score + sd))
     return r, low, high
 
 
@@ -128,17 +132,18 @@ def rests_on_overlaps(evidence: Evidence) -> bool:
 
 def losses(evidence: Evidence) -> dict[str, float]:
     """By how much the bound would rise if one measure were as in the best eighth of the fit, for each known measure."""
-    table, score, known = _table(evidence), correlation_score(evidence), _known_fraction(evidence)
-    seen = _seen_sliding(evidence)
+    table, score, shown = _table(evidence), correlation_score(evidence), _shown_fraction(evidence)
+    known, seen = shown * _known_fraction(evidence), fraction_seen(evidence)
     best = {
         name: max(_as_far_as_seen(name, float(each["value"][BEST_EIGHTH]), seen) - _term(name, each, evidence), 0.0)
         for name, each in _terms(table)
     }
     bound = known * _bound(score, evidence)
-    return {
-        name: (1.0 if name == "gap_error" else known) * _bound(score + rise, evidence) - bound
+    found = {
+        name: (shown if name == "gap_error" else known) * _bound(score + rise, evidence) - bound
         for name, rise in best.items()
     }
+    return {**found, "closed_overlap": bound / shown - bound}
 
 
 def _known_fraction(evidence: Evidence) -> float:
@@ -146,6 +151,11 @@ def _known_fraction(evidence: Evidence) -> float:
     found = evidence.information
     unexplained = min(found.gap_error, found.unexplained_gap) / found.diameter
     return WIDEST / unexplained if unexplained > WIDEST else 1.0
+
+
+def _shown_fraction(evidence: Evidence) -> float:
+    """Fraction of r that is left where gaps were closed that would show forces."""
+    return CLOSED / (CLOSED + closed_overlap(evidence))
 
 
 def _bound(score: float, evidence: Evidence) -> float:
@@ -166,7 +176,7 @@ def _term(name: str, table: dict[str, Any], evidence: Evidence) -> float:
     if math.isnan(measure):
         return 0.0
     value = float(np.interp(_logarithm(table, measure), np.log(table["at"]), table["value"]))
-    return _as_far_as_seen(name, value, _seen_sliding(evidence))
+    return _as_far_as_seen(name, value, fraction_seen(evidence))
 
 
 def _as_far_as_seen(name: str, value: float, seen: float) -> float:
@@ -179,12 +189,30 @@ def weaken(value: Array | float, strength: Array | float) -> Array:
     return np.where(np.greater(value, 0.0), strength * value, value)
 
 
+def unexplained_correction(evidence: Evidence) -> float:
+    """Correction ε of the measured motion beyond that of noise: where nothing slides, the motion is noise."""
+    return max(evidence.correction - CORRECTED_NOISE * (1.0 - fraction_seen(evidence)), 0.0)
+
+
+def closed_overlap(evidence: Evidence) -> float:
+    """Corrections of gaps as errors of single grains, beyond noise, over the diameter, as far as forces rest on gaps.
+
+    Overlaps that show forces are corrected with such errors; the motion distinguishes both only where grains slide.
+    """
+    found = evidence.information
+    beyond = evidence.corrected_gap - found.noise
+    if not beyond > 0.0:
+        return 0.0
+    return evidence.position_weight * (1.0 - fraction_seen(evidence)) * beyond / found.diameter
+
+
 def seen_sliding(hidden: Array | np.float64) -> Array:
     """Sliding over its noise, at most 1, of values (f,) of the measure "hidden_sliding"."""
     return np.minimum(1.0 / hidden - LEAST_SIGNAL, 1.0)
 
 
-def _seen_sliding(evidence: Evidence) -> float:
+def fraction_seen(evidence: Evidence) -> float:
+    """Fraction of the sliding that is seen; 1 where that is not known."""
     hidden = MEASURES["hidden_sliding"](evidence)
     return 1.0 if math.isnan(hidden) else float(seen_sliding(np.float64(hidden)))
 

@@ -166,6 +166,8 @@ def _contradictions(evidence: Evidence) -> list[Penalty]:
         "centres are wrong, or grains soft; measure radii, or let calibration find them",
         "disagreement_of_positions": "forces from the positions and from the balance of overlaps agree by "
         f"{evidence.position_agreement:.2f} only: radii, centres or the camera are wrong, or noise hides the overlaps",
+        "closed_overlap": f"gaps were corrected by {1e6 * evidence.corrected_gap:.3g} µm as errors of single rods, and "
+        "overlaps with them: little is left that shows forces where nothing slides; measure centres and radii",
         "power_gap": f"{100.0 * evidence.power_gap:.0f} % of the power of friction at its limit is missing from the "
         "measured sliding: the friction of rods, walls or base, rotations, or the order of the photographs",
         "hidden_sliding": f"contacts slide by {found.slide_signal:.2g} times the noise of a slide only: use a step "

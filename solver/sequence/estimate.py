@@ -285,6 +285,7 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
         frames_since_event=state.frames_since_event + 1,
         start_difference=estimate.start_difference,
         inferred=problem.sequence.inferred,
+        corrected_gap=problem.settings.corrected_gap,
         start_forgotten=estimate.members.start_forgotten,
         holes=len(find_holes(packing.grains, snapshot.position, snapshot.present, step.walls)),
         grains=int(snapshot.present.sum()),

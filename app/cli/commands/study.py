@@ -296,13 +296,10 @@ def _study_trust(request: _StudyRequest, *, jobs: int, fit: tuple[int, ...]) -> 
         if fit:
             read: list[ScenarioName] = [name for name in scenarios if name not in trust_study.LEFT_OUT]
             read_scores = score_scenarios(request.plan, read, fit, jobs=jobs, progress=progress)
-            known = TrustSample.of(read_scores)
-            for title, names in trust_study.FITS.items():
-                fits[title] = trust_study.fit_expected(trust_study.rows_of(known, title), names)
-                print_line(console, fits[title].describe(title))
-            tests = TrustSample.of_tests([each for each in read_scores if not each.refused], PREDICTED_PHOTOGRAPHS)
-            print_line(console, trust_study.describe_prediction(tests))
-            print_line(console, trust_study.describe_scale_fit(read_scores))
+            still = score_scenarios(request.plan, trust_study.CLOSED_KINDS, fit, jobs=jobs, progress=progress)
+            fits = trust_study.fit_by_title(read_scores)
+            for each in trust_study.describe_fits(fits, read_scores, still, PREDICTED_PHOTOGRAPHS):
+                print_line(console, each)
         scores = score_scenarios(request.plan, scenarios, request.seeds, jobs=jobs, progress=progress)
     sample = trust_study.refit(TrustSample.of(scores), fits)
     new = np.isin(sample.kind, list(trust_study.LEFT_OUT))

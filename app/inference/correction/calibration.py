@@ -83,6 +83,15 @@ def calibrate_tracks(
     return corrected, replace(walls, endpoints=better.endpoints), found
 
 
+def own_gap_error(found: Calibration) -> float:
+    """Compute the rms part of a gap [m] that was corrected as errors of single grains.
+
+    Where the grains hardly move against each other, such errors look like overlaps, which are corrected with them.
+    """
+    own = found.radius - np.median(found.radius)
+    return float(np.sqrt(2.0 * (np.mean(found.offset**2) + np.mean(own**2))))
+
+
 def known_radii(radius: Array) -> Array | None:
     """Find the different radii (q,) [m] among the radii (n,) [m], ascending; None where there are no classes."""
     classes = radius_classes(radius)

@@ -82,7 +82,11 @@ def _regress(measure: Array, rest: Array, weight: Array, factor: Array) -> tuple
     order = np.argsort(x, kind="stable")
     x, w = x[order], w[order]
     fitted = isotonic_regression(y[order], weights=w, increasing=False).x
-    at = np.unique(np.quantile(x, np.linspace(0.0, 1.0, KNOTS), method="nearest"))
+    knots = np.linspace(0.0, 1.0, KNOTS)
+    at = np.unique(np.quantile(x, knots, method="nearest"))
+    above = x[x > at[0]]
+    if len(at) < KNOTS and len(above):  # many frames have the least value: the others have knots of their own
+        at = np.append(at[0], np.unique(np.quantile(above, knots[1:], method="nearest")))
     reach = max(SMOOTH * float(at[-1] - at[0]), 1e-9)
     value = np.array([np.average(fitted[near], weights=w[near]) for near in (np.abs(x - c) <= reach for c in at)])
     value = np.minimum.accumulate(value)

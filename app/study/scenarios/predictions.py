@@ -37,7 +37,10 @@ TRUE_CAUSE: dict[ScenarioName, tuple[str, ...]] = {
     "lens_03": ("lens",),
     "soft_stretched": ("stretched_picture",), "softer_stretched": ("stretched_picture",),
     "class_2": ("class_radii",), "wrong_class": ("exchanged_sizes",),
-    "some_radii": ("not_explained", "all_radii", "class_radii"),
+    **dict.fromkeys(
+        ("some_radii", "stepped_some_radii", "annulus_some_radii"), ("not_explained", "all_radii", "class_radii")
+    ),
+    "rising_lens": ("lens", "not_explained"),
     "outliers": ("outlier_tracks",), "one_jump": ("outlier_tracks",), "missing_poses": ("missing_poses",),
     "base_friction": ("base_friction",), "smooth_walls": ("wall_friction",), "rough_walls": ("wall_friction",),
     "smooth_walls_spread": ("wall_friction",), "cohesion": ("adhesion",), "strong_cohesion": ("adhesion",),

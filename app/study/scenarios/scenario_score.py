@@ -27,7 +27,7 @@ from ...process.progress import Progress, no_progress
 from ...results.results import Results
 from ...results.truth import names_of_given, read_truth, true_ids
 from ...solver.assessment.evidence import Evidence
-from ...solver.assessment.expected_correlation import MEASURES, rests_on_overlaps
+from ...solver.assessment.expected_correlation import MEASURES, closed_overlap, rests_on_overlaps
 from ...solver.assessment.intervals.scale_sd import scale_terms
 from ...solver.bodies.grains import Array
 from ...solver.contacts.pairs import Keys, match_values
@@ -58,6 +58,7 @@ class ScenarioScore:
     trust: tuple[float | None, ...] = ()  # (f,)
     expected: tuple[float | None, ...] = ()  # (f,) expected correlation
     measures: tuple[tuple[float | None, ...], ...] = ()  # (f, m) of the evidence, see `expected_correlation.MEASURES`
+    closed_overlap: tuple[float | None, ...] = ()  # (f,) over the mean diameter
     scales: tuple[float | None, ...] = ()  # (f,) Σ f_n / Σ f_n,true; empty without a scale of forces
     scale_terms: tuple[tuple[float | None, ...], ...] = ()  # (f, t) of its standard deviation, see `scale_sd.TERMS`
     scale_sd: tuple[float | None, ...] = ()  # (f,) as stated
@@ -124,6 +125,7 @@ def score_scenario(
         true = true_forces(experiment, solution.sequence)
     return replace(
         _compare(scenario, seed, solution.sequence, frames, true, cpu),
+        closed_overlap=tuple(_plain(closed_overlap(each)) for each in solution.evidence),
         scale_terms=tuple(tuple(_plain(term) for term in scale_terms(each)) for each in solution.evidence),
         overlaps=tuple(rests_on_overlaps(each) for each in solution.evidence),
         measures=tuple(tuple(_plain(measure(each)) for measure in MEASURES.values()) for each in solution.evidence),

@@ -7,7 +7,7 @@ The bound is fitted on seeds and kinds left out in turn; kinds that no fit reads
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,11 +16,11 @@ from rich.console import Console
 from rich.table import Table
 from scipy.stats import spearmanr
 
-from ...solver.assessment.expected_correlation import BY_SLIDING, LEAST, MEASURES, seen_sliding
+from ...solver.assessment.expected_correlation import BY_SLIDING, CLOSED, LEAST, MEASURES, seen_sliding
 from ...solver.assessment.intervals.scale_sd import FIRST_BY_SECOND, TABLE, TERMS
 from ...solver.assessment.intervals.scale_sd import LEAST as LEAST_SCALE_SD
 from ...solver.bodies.grains import Array
-from ...synthetic.scenarios.preset_names import Group
+from ...synthetic.scenarios.preset_names import Group, ScenarioName
 from ...synthetic.scenarios.scenario_table import SCENARIOS, Scenario
 from ..fitting.additive_fit import AdditiveFit, correlation_target, fit_additive
 from ..fitting.bound_fit import BoundFit, JudgedFrames, fit_bound
@@ -33,7 +33,16 @@ LEFT_OUT = frozenset({
     "step_1", "circle", "corners", "radii_03", "strong_cohesion", "rolling", "stiff_moving", "theta_sign", "aspect_03",
     "walls_late", "left_late", "swapped_frames", "shuffled", "outliers", "one_jump", "missing_poses", "tilted_bed",
     "stiff_loose", "rough_walls", "rising_corners", "shear_box", "footing", "intruder", "drum", "stiffest",
+    "isotropic_centres", "stepped_centres", "rising_centres", "annulus_centres", "cycles_centres", "annulus_radii_1",
+    "cycles_radii_1", "tilted_radii_1", "stepped_some_radii", "annulus_some_radii", "rising_lens",
 })  # fmt: skip
+# Kinds at rest whose errors look like overlaps, by which the effect of closed gaps is fitted; others judge it.
+CLOSED_KINDS: tuple[ScenarioName, ...] = (
+    "stepped_centres", "cycles_centres", "annulus_radii_1", "tilted_radii_1",
+    "stepped_some_radii", "annulus_some_radii",
+)  # fmt: skip
+CLOSED_STEPS = (0.05, 0.03, 0.02, 0.015, 0.01, 0.0075, 0.005)  # tried from the first on
+CLOSED_TOO_HIGH = 0.1  # fraction of their frames with a trust that is too high
 TOO_HIGH, TOO_LOW = TRUST_TOLERANCE, 0.15  # T above r, T below r
 # Excess of T over r, and fraction of the frames of any group that may have more while their kind is left out: what T
 # claims, of kinds that no fit has read.
@@ -176,12 +185,69 @@ def fit_expected(sample: TrustSample, names: Sequence[str]) -> TrustFit:
     return TrustFit(whole, fit_bound(frames, groups, LIMITS))
 
 
+def fit_by_title(scores: Sequence[ScenarioScore]) -> dict[str, TrustFit]:
+    """Fit every one of FITS to the frames that it reads."""
+    known = TrustSample.of(scores)
+    return {title: fit_expected(rows_of(known, title), names) for title, names in FITS.items()}
+
+
+def describe_fits(
+    fits: Mapping[str, TrustFit], scores: Sequence[ScenarioScore], still: Sequence[ScenarioScore], photographs: int
+) -> list[str]:
+    """Describe all fits as tables of fitted.toml.
+
+    Parameters
+    ----------
+    fits : mapping of str to TrustFit
+        By `fit_by_title`.
+    scores : sequence of ScenarioScore
+        That they were fitted to.
+    still : sequence of ScenarioScore
+        Of CLOSED_KINDS.
+    photographs : int
+        The first ones of a test, by which r is predicted.
+    """
+    tests = TrustSample.of_tests([each for each in scores if not each.refused], photographs)
+    return [
+        *(fit.describe(title) for title, fit in fits.items()),
+        describe_prediction(tests), describe_scale_fit(scores), describe_closed_fit(still),
+    ]  # fmt: skip
+
+
 def describe_prediction(tests: TrustSample) -> str:
     """Fit the prediction on whole tests, and describe it as the table of fitted.toml."""
     whole, score = _fit_leaving_out(tests, PREDICTED_BY)
     sd = float(np.quantile(np.abs(correlation_target(tests.r) - score), WITHIN_INTERVAL))
     lines = whole.describe()
     return "\n".join(["[expected_correlation.prediction]", *lines[:2], f"sd = {sd:.3f}", *lines[2:]])
+
+
+def describe_closed_fit(scores: Sequence[ScenarioScore]) -> str:
+    """Fit the effect of closed gaps on the trust, and describe it as a line of fitted.toml."""
+    return f"[expected_correlation]\nclosed_overlap = {fit_closed(scores):g}"
+
+
+def fit_closed(scores: Sequence[ScenarioScore]) -> float:
+    """The greatest of CLOSED_STEPS with which the trust of CLOSED_KINDS is too high in few frames; NaN without these.
+
+    Notes
+    -----
+    T is proportional to x_0/(x_0 + x) with the closed overlap x of a frame.
+    """
+    rows = [
+        (score.closed_overlap[k], score.trust[k], score.r[k])
+        for score in scores
+        if score.scenario in CLOSED_KINDS
+        for k in range(1, len(score.r))
+        if None not in (score.trust[k], score.r[k], score.closed_overlap[k])
+    ]
+    if not rows:
+        return math.nan
+    closed, trust, r = np.array(rows, float).T
+    alone = trust * (CLOSED + closed) / CLOSED
+    fractions = [float(np.mean(alone * each / (each + closed) > r + TOO_HIGH)) for each in CLOSED_STEPS]
+    enough = [step for step, high in zip(CLOSED_STEPS, fractions, strict=True) if high <= CLOSED_TOO_HIGH]
+    return max(enough, default=CLOSED_STEPS[-1])
 
 
 def scale_sample(scores: Sequence[ScenarioScore]) -> ScaleSample:

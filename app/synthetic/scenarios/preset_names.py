@@ -15,6 +15,8 @@ ScenarioName = Literal[
     "corners", "short_walls", "unseen", "camera", "centres", "radii_03", "radii_1", "radius_offset",
     "mu_low", "mu_high", "step_05", "step_1", "ten_frames", "periodic", "outer", "circle", "loads",
     "loose", "cyclic", "noise_40", "correlated_noise", "annulus", "tilted_bed", "tiny_cycles", "power_law",
+    "isotropic_centres", "stepped_centres", "rising_centres", "annulus_centres", "cycles_centres",
+    "annulus_radii_1", "cycles_radii_1", "tilted_radii_1",
     "moving", "stepped_loads", "membrane", "shear_box", "footing", "intruder", "drum", "stiffest",
     "stiff", "stiff_moving", "stiff_loose", "stiff_noise_40",
     "base_friction", "cohesion", "strong_cohesion", "friction_spread",
@@ -24,5 +26,5 @@ ScenarioName = Literal[
     "theta_sign", "theta_zero", "theta_degrees", "theta_absent",
     "mu_01", "mu_05", "walls_late", "left_late", "top_fixed", "wall_inside",
     "aspect_03", "aspect_1", "lens_03", "class_2", "some_radii", "wrong_class", "overhang", "outliers", "one_jump",
-    "missing_poses",
+    "missing_poses", "stepped_some_radii", "annulus_some_radii", "rising_lens",
 ]  # fmt: skip

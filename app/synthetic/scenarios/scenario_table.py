@@ -105,6 +105,12 @@ FRINGED_LOADINGS: dict[FringedPreset, LoadingPath] = {
 
 
 MOVED = LoadingPath(shear, 0.25, initial_shear=2.0, plates=("top",))  # the first photograph is like the others
+# Loadings by which hardly any contact slides.
+ISOTROPIC = LoadingPath(load_isotropically, 0.0)
+STEPPED = LoadingPath(step_loads, 0.0, measured=("top", "right"))
+TURNED = LoadingPath(turn_core, 0.02, plates=("ring",), ring=True)
+TILTED = LoadingPath(tilt_heap, 1.0, settings=HEAP, open_top=True)
+TINY = LoadingPath(shear_cyclically, 0.01, initial_shear=2.0, plates=("top",))
 
 
 def _sheared(**changes: Any) -> LoadingPath:
@@ -129,8 +135,9 @@ def _missing(
     return Scenario(meaning, loading, departure, noise, group="missing physics")
 
 
-def _wrong(meaning: str, departure: Departure) -> Scenario:
-    return Scenario(f"sheared; {meaning}", MOVED, departure, group="wrong input")
+def _wrong(meaning: str, departure: Departure, loading: LoadingPath = MOVED) -> Scenario:
+    meaning = f"sheared; {meaning}" if loading is MOVED else meaning
+    return Scenario(meaning, loading, departure, group="wrong input")
 
 
 SCENARIOS: dict[ScenarioName, Scenario] = {
@@ -145,7 +152,7 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     ),
     "isotropic": Scenario(
         "loaded and unloaded from two sides between 1 and 3 times 50 kPa; no pressure is stated",
-        LoadingPath(load_isotropically, 0.0),
+        ISOTROPIC,
     ),
     "rising_loads": Scenario(
         "loaded and unloaded from two sides between 1 and 3 times 50 kPa, both loads measured; contacts ten times as "
@@ -154,7 +161,7 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     ),
     "stepped_loads": Scenario(
         "the load on the plate rises by 5 % a photograph, that on the right side doubles once; both are measured",
-        LoadingPath(step_loads, 0.0, measured=("top", "right")),
+        STEPPED,
     ),
     "rising_corners": Scenario("the same; walls end where the bars meet", RISING, state_corners),
     "gravity": Scenario(
@@ -224,15 +231,15 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     ),
     "tiny_cycles": Scenario(
         "shear to and fro by four steps of .01°",
-        LoadingPath(shear_cyclically, 0.01, initial_shear=2.0, plates=("top",)),
+        TINY,
     ),
     "annulus": Scenario(
         "a core turns by .02 rad a photograph in a ring under pressure",
-        LoadingPath(turn_core, 0.02, plates=("ring",), ring=True),
+        TURNED,
     ),
     "tilted_bed": Scenario(
         "a box with a free surface tilts by 1° a photograph; no plate",
-        LoadingPath(tilt_heap, 1.0, settings=HEAP, open_top=True),
+        TILTED,
     ),
     "power_law": Scenario("sheared; radii 1:6, most of them small", replace(MOVED, sizes=_choose_by_power_law)),
     "moving": Scenario(
@@ -255,6 +262,14 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
         LoadingPath(compress_in_membrane, 0.002, measured=("top",), bed=True),
         state_membrane,
     ),
+    "isotropic_centres": Scenario("isotropic; centres as in `centres`", ISOTROPIC, displace_centres),
+    "stepped_centres": Scenario("stepped loads; centres as in `centres`", STEPPED, displace_centres),
+    "rising_centres": Scenario("rising loads; centres as in `centres`", RISING, displace_centres),
+    "annulus_centres": Scenario("annulus; centres as in `centres`", TURNED, displace_centres),
+    "cycles_centres": Scenario("tiny cycles; centres as in `centres`", TINY, displace_centres),
+    "annulus_radii_1": Scenario("annulus; radii with 1 % random error", TURNED, scatter_radii(0.01)),
+    "cycles_radii_1": Scenario("tiny cycles; radii with 1 % random error", TINY, scatter_radii(0.01)),
+    "tilted_radii_1": Scenario("tilted bed; radii with 1 % random error", TILTED, scatter_radii(0.01)),
     "shear_box": _missing(
         "direct shear box: the upper half slides over the lower one by .2 % of the width a photograph; its edges bear "
         "on rods",
@@ -327,4 +342,7 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     "outliers": _wrong("2 % of the poses displaced by .3 to 2 mm", add_outliers),
     "one_jump": _wrong("one rod displaced by 1 mm in one photograph", displace_one_pose),
     "missing_poses": _wrong("10 % of the poses missing", lose_poses),
+    "stepped_some_radii": _wrong("stepped loads; a fifth of the rods stated 2 % too large", misstate_some, STEPPED),
+    "annulus_some_radii": _wrong("annulus; a fifth of the rods stated 2 % too large", misstate_some, TURNED),
+    "rising_lens": _wrong("rising loads; seen through a lens as in `lens_03`", distort_picture(0.003), RISING),
 }  # fmt: skip

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from ..evidence import Evidence
-from ..expected_correlation import correlation_score
+from ..expected_correlation import correlation_score, unexplained_correction
 from ..fitted import FITTED
 
 TABLE = FITTED["scale_sd"]
@@ -18,7 +18,7 @@ FIRST_BY_SECOND: float = TABLE["first_by_second"]
 # Evidence that the scale is uncertain, by the name of its factor in fitted.toml; NaN: not known.
 TERMS: dict[str, Callable[[Evidence], float]] = {
     "per_load": lambda e: abs(math.log(e.load_fraction)) if e.load_fraction > 0.0 else 0.0,
-    "per_correction": lambda e: e.correction,
+    "per_correction": unexplained_correction,
     "per_power_gap": lambda e: e.power_gap,
     "per_error": lambda e: math.exp(-2.0 * correlation_score(e)),
     "per_inertia": lambda e: e.inertial_number,
@@ -42,10 +42,11 @@ def scale_sd(evidence: Evidence) -> float:
     -----
     Of a frame to which no motion leads, the fitted error common to all of its forces. Otherwise
     σ² = a² + (b ln q)² + (c ε)² + (d p)² + (e (1 − r)/(1 + r))² + (f I)²: q the mean stress of the field over that of
-    the loads, ε the correction of the measured motion, p the power gap, r the expected correlation and I the inertial
-    number. Wrong input makes part of the load vanish, so that q is far from 1; an anisotropic stress does so, too, and
-    widens σ without need. Fitted on simulated packings (fitted.toml). Where weight alone sets the scale, a wall that
-    presses on the packing may add any force: the standard deviation of the scale among the ensemble members is added.
+    the loads, ε the correction of the measured motion beyond that of noise, p the power gap, r the expected correlation
+    and I the inertial number. Wrong input makes part of the load vanish, so that q is far from 1; an anisotropic stress
+    does so, too, and widens σ without need. Fitted on simulated packings (fitted.toml). Where weight alone sets the
+    scale, a wall that presses on the packing may add any force: the standard deviation of the scale among the ensemble
+    members is added.
     """
     members = 0.0 if math.isnan(evidence.scale_disagreement) else evidence.scale_disagreement
     if not evidence.assessed:

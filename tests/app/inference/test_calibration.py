@@ -9,7 +9,7 @@ import pytest
 from rodsight.cli.summary_table import calibration_lines
 from rodsight.experiment.config.experiment_file import ExperimentFile
 from rodsight.experiment.scaling import make_scale
-from rodsight.inference.correction.calibration import calibrate_tracks, radius_classes
+from rodsight.inference.correction.calibration import calibrate_tracks, own_gap_error, radius_classes
 from rodsight.inference.inference_settings import radii_are_metres, settings_of
 from rodsight.results.calibration_summary import calibration_facts
 from rodsight.solver.calibration.calibrate import Calibration, calibrate
@@ -172,3 +172,15 @@ def test_lens_is_found_and_corrected():
     straight = calibrate(replace(measured, position=tracks.position), priors, rng=np.random.default_rng(1))
     assert straight.lens == 0.0
     assert straight.lens_sd > 0.0
+
+
+def test_errors_of_single_rods_make_the_corrected_part_of_a_gap() -> None:
+    tracks, walls = square_lattice()
+    _, _, found = calibrate_tracks(CalibrationSettings(), tracks, walls, 0.0)
+    assert found is not None
+    n, rng = tracks.grain_count, np.random.default_rng(1)
+    alike = replace(found, offset=np.zeros((n, 2)), radius=np.full(n, 3e-5))
+    assert own_gap_error(alike) == 0.0  # an error that all radii share is no error of a single rod
+    offset, radius = rng.normal(0.0, 4e-5, (n, 2)), rng.normal(0.0, 3e-5, n)
+    own = own_gap_error(replace(alike, offset=offset, radius=alike.radius + radius))
+    assert own == pytest.approx(2.0**0.5 * 5e-5, rel=0.2)

@@ -115,7 +115,7 @@ def test_a_scenario_is_solved_and_compared_with_its_whole_truth(tmp_path: Path) 
 
 def test_scenarios_without_a_loaded_plate_have_no_known_scale() -> None:
     unknown = {name for name, scenario in SCENARIOS.items() if not scenario.scale_known}
-    assert unknown == {"isotropic", "nearly_jammed", "outer", "periodic"}
+    assert unknown == {"isotropic", "isotropic_centres", "nearly_jammed", "outer", "periodic"}
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,12 @@ from rodsight.solver.assessment.expected_correlation import (
     MEASURES,
     WIDEST,
     bound_correlation,
+    closed_overlap,
     correlation_score,
     expect_correlation,
     losses,
     predict_correlation,
+    unexplained_correction,
 )
 from rodsight.solver.assessment.fitted import FITTED
 
@@ -139,3 +141,27 @@ def test_agreement_without_sliding_is_no_evidence():
         predict_correlation([replace(BOTH, information=replace(BOTH.information, slide_signal=0.0), **calm)])[0]
         < predict_correlation([replace(BOTH, information=replace(BOTH.information, slide_signal=0.1), **calm)])[0]
     )
+
+
+def test_a_correction_at_rest_is_noise_unless_it_is_greater():
+    moving, still = (
+        replace(BOTH, information=replace(BOTH.information, slide_signal=each)) for each in (2.0, 0.0)
+    )  # fmt: skip
+    assert unexplained_correction(replace(moving, correction=0.8)) == pytest.approx(0.8)
+    assert unexplained_correction(replace(still, correction=0.8)) == pytest.approx(0.0)
+    assert unexplained_correction(replace(still, correction=5.0)) == pytest.approx(5.0 - 1.2)
+    assert math.isnan(unexplained_correction(replace(still, correction=math.nan)))
+    assert expect_correlation(replace(still, correction=0.8)) == expect_correlation(replace(still, correction=0.2))
+
+
+def test_gaps_that_were_closed_count_where_forces_rest_on_them_and_nothing_slides():
+    still = replace(BOTH, position_weight=0.8, information=replace(BOTH.information, slide_signal=0.0))
+    noise, diameter = still.information.noise, still.information.diameter
+    closed = replace(still, corrected_gap=noise + 0.01 * diameter)
+    assert closed_overlap(closed) == pytest.approx(0.8 * 0.01)
+    assert closed_overlap(replace(still, corrected_gap=noise)) == 0.0
+    assert closed_overlap(replace(closed, position_weight=0.0)) == 0.0
+    sliding = replace(closed, information=replace(BOTH.information, slide_signal=3.0))
+    assert closed_overlap(sliding) == 0.0
+    assert bound_correlation(closed) < bound_correlation(still)
+    assert losses(closed)["closed_overlap"] > 0.1

@@ -1,0 +1,42 @@
+"""Fits of the trust: the effect of closed gaps, and measures that most frames have at their least value."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from rodsight.solver.assessment.expected_correlation import CLOSED
+from rodsight.study.fitting.additive_fit import fit_additive
+from rodsight.study.scenarios.scenario_score import ScenarioScore
+from rodsight.study.scenarios.trust_study import CLOSED_KINDS, CLOSED_STEPS, describe_closed_fit, fit_closed
+
+ALONE = 0.9  # trust by all other evidence
+
+
+def still(closed: float, r: float, scenario=CLOSED_KINDS[0]) -> ScenarioScore:
+    """Ten frames of one closed overlap and one r, the trust as a run states it."""
+    trust = ALONE * CLOSED / (CLOSED + closed)
+    return ScenarioScore(scenario, 1, "", r=(r,) * 10, trust=(trust,) * 10, closed_overlap=(closed,) * 10)
+
+
+@pytest.mark.parametrize("step", CLOSED_STEPS)
+def test_the_greatest_step_with_a_sufficient_trust_is_found(step):
+    closed = 0.004
+    limit = ALONE * step / (step + closed)
+    assert fit_closed([still(closed, limit - 0.02)]) == step
+    assert describe_closed_fit([still(closed, limit - 0.02)]).endswith(f"closed_overlap = {step:g}")
+
+
+def test_kinds_that_slide_are_not_read():
+    assert math.isnan(fit_closed([still(0.004, 0.5, "shear")]))
+    assert fit_closed([still(0.004, 0.99), still(0.004, 0.99, "shear")]) == CLOSED_STEPS[0]
+
+
+def test_values_above_the_usual_one_have_knots_of_their_own():
+    rng = np.random.default_rng(3)
+    x = np.where(rng.random(4000) < 0.9, 0.0, rng.uniform(0.5, 4.0, 4000))
+    fit = fit_additive({"x": x}, {}, ["x"], 2.0 - 0.4 * x, np.ones(len(x)) / len(x))
+    assert len(fit.terms["x"][0]) > 6
+    shown = np.array([0.0, 1.0, 2.0, 3.0])
+    assert fit.score({"x": shown}, {}) == pytest.approx(2.0 - 0.4 * shown, abs=0.25)
