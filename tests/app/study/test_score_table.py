@@ -124,7 +124,7 @@ def test_scenarios_without_a_loaded_plate_have_no_known_scale() -> None:
         (("study", "worlds", "--jobs", "0"), "--jobs: 0"),
         (("study", "paper", "--worlds", "shear"), "--worlds with paper"),
         (("study", "paper", "--json"), "--json with paper"),
-        (("synth", "OUT", "--preset", "camera"), "--photographs with preset camera"),
+        (("synth", "OUT", "--preset", "camera"), "--preset camera: makes tracks"),
         (("synth", "OUT", "--preset", "camera", "--no-photographs", "--reversal"), "--reversal with preset camera"),
     ],
     ids=" ".join,
