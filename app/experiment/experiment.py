@@ -293,11 +293,27 @@ def arrange_tracks(grains: Table, poses: Table, times: Table, precision: float) 
         radius=radius,
         time=arrange_times(times, frame_count),
         position=position,
-        rotation=rotation,
+        rotation=unwrap_angles(rotation),
         sigma=held_once(np.where(present, precision, np.nan)),
         zncc=np.broadcast_to(np.nan, shape),
         status=held_once(np.where(present, np.uint8(TrackStatus.GIVEN), np.uint8(TrackStatus.LOST))),
     )
+
+
+def unwrap_angles(angle: Array) -> Array:
+    """Return angles (f, n) [rad] without jumps by whole turns, where all are given within one turn, as by atan2.
+
+    A rod that turns from 359° to 1° turned by 2°. Angles over more than a turn are given continuously, and stay.
+    """
+    known = np.isfinite(angle)
+    if not known.any() or np.nanmax(angle) - np.nanmin(angle) > 2.0 * np.pi:
+        return angle
+    unwrapped, last = angle.copy(), np.full(angle.shape[1], np.nan)
+    for each, seen in zip(unwrapped, known, strict=True):
+        turns = np.rint((each - last) / (2.0 * np.pi))
+        each -= 2.0 * np.pi * np.where(np.isfinite(turns), turns, 0.0)
+        last[seen] = each[seen]
+    return unwrapped
 
 
 def read_grain_guess(experiment: Experiment) -> GrainGuess | None:
