@@ -258,7 +258,7 @@ def check_inside(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> N
 
 
 def _cause_of_walls(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> str:
-    """Return the mistake whose correction puts the grains of frame 0 between the walls."""
+    """Return the mistake whose correction puts the grains of frame 0 between the walls; empty where they are."""
     ends, side = walls.endpoints[0], walls.sides
     photographs = experiment.config.photographs
     pixel = photographs.pixel_size if photographs is not None else None
@@ -273,6 +273,8 @@ def _cause_of_walls(experiment: Experiment, tracks: Tracks, walls: WallTracks) -
         guesses.append(("walls look like pixels", pixel * ends, side))
         guesses.append(("walls look like pixels", _upside_down(pixel * ends, place), side))
     radius = tracks.radius[tracks.present[0]]
+    if _all_inside(place, radius, ends, side):  # a single place of a later frame is wrong
+        return ""
     if _all_inside(1e-3 * place, radius, ends, side):
         return ": coordinates look like millimetres"
     return next((f": {cause}" for cause, *guess in guesses if _all_inside(place, radius, *guess)), "")

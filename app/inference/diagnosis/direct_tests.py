@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import islice
 
 import numpy as np
@@ -12,7 +12,7 @@ from ...results.finding import Finding
 from ...solver.bodies.grains import Array, Grains
 from ...solver.bodies.rods import RodMaterial
 from ...solver.bodies.strain import displacement_gradient, inertial_time, shear_strain
-from ...solver.bodies.wall_shapes import STRAIGHT
+from ...solver.bodies.wall_shapes import STRAIGHT, outward_normals
 from ...solver.contacts.contacts import detect_contacts
 from ...solver.inferred.unknown_rotations import fill_unknown_rotations
 from ...solver.statistics.agreement import pearson, ranks
@@ -35,6 +35,8 @@ STILL = 1.5  # … or over that of noise alone
 MOVES = 4.0  # noise that the median step must exceed for that
 DRIFT_SIGMAS = 15.0  # standard deviations of a position by which rods may leave or penetrate a wall …
 DRIFT = 0.02  # … and fraction of the mean radius
+TOGETHER = 0.2  # of the greatest change of a gap at a wall: what a common translation of all rods may leave
+IN_BOTH = 0.1  # fraction of the rods that two photographs must show to be compared
 BEYOND = 0.1  # mean radius by which rods may stand beyond a wall
 USUAL, BEYOND_USUAL = 0.99, 1.5  # quantile of all overlaps, and times it that an outlier overlaps another body
 MISSING = 0.03  # fraction of the poses that may be missing
@@ -169,24 +171,43 @@ def examine_order(tracks: Tracks) -> list[Finding]:
 
 
 def examine_walls(tracks: Tracks, walls: WallTracks) -> list[Finding]:
-    """Look for straight walls that rods leave or penetrate more and more."""
+    """Look for straight walls that rods leave or penetrate more and more, unless all rods move so against all walls.
+
+    A camera that moves changes the gaps at opposite walls in opposite ways, which a run corrects.
+    """
     if walls.count == 0 or tracks.frame_count < 3:
         return []
     allowed = max(DRIFT_SIGMAS * float(np.nanmedian(tracks.position_sigma)), DRIFT * float(tracks.radius.mean()))
+    changes = {w: _change_of_gap(tracks, walls, w) for w in np.flatnonzero(walls.sides == STRAIGHT).tolist()}
+    changes = {w: change for w, change in changes.items() if np.isfinite(change)}
+    if _moved_together(walls, changes):
+        return []
     found = []
-    for w in np.flatnonzero(walls.sides == STRAIGHT).tolist():
-        forward, back = (_known_gaps(tracks, walls, w, order) for order in (1, -1))
-        begin, end = list(islice(forward, 1)), list(islice(back, 3))
-        if len(end) < 3:
-            continue
-        last = float(np.median(np.array(end) - begin))
+    for w, change in changes.items():
         loaded = np.isfinite(walls.pressure[w]) or (walls.load is not None and np.isfinite(walls.load[:, w]).any())
         still = float(np.abs(walls.endpoints[:, w] - walls.endpoints[0, w]).max()) < allowed
-        if still and (last < -allowed or (loaded and last > allowed)):
-            does = "penetrate" if last < 0 else "leave"
-            words = f"rods {does} wall '{walls.name[w]}', which does not move, by {1e3 * abs(last):.2g} mm"
+        if still and (change < -allowed or (loaded and change > allowed)):
+            does = "penetrate" if change < 0 else "leave"
+            words = f"rods {does} wall '{walls.name[w]}', which does not move, by {1e3 * abs(change):.2g} mm"
             found.append(finding("wall_at_rest", words))
     return found
+
+
+def _change_of_gap(tracks: Tracks, walls: WallTracks, w: int) -> float:
+    """Median change of the gap at wall w [m] from the first photograph to the last three; NaN without rods there."""
+    forward, back = (_known_gaps(tracks, walls, w, order) for order in (1, -1))
+    begin, end = list(islice(forward, 1)), list(islice(back, 3))
+    return float(np.median(np.array(end) - begin)) if len(end) == 3 else np.nan
+
+
+def _moved_together(walls: WallTracks, changes: Mapping[int, float]) -> bool:
+    """Whether one translation of all rods explains the changes of the gaps [m] at more walls than it has components."""
+    normal = outward_normals(walls.endpoints[0, list(changes)])
+    change = np.array(list(changes.values()))
+    if len(change) <= np.linalg.matrix_rank(normal, tol=0.1):
+        return False
+    rest = change + normal @ np.linalg.lstsq(normal, -change, rcond=0.1)[0]
+    return bool(np.abs(rest).max() < TOGETHER * np.abs(change).max())
 
 
 def examine_poses(tracks: Tracks, impossible: NDArray[np.bool_]) -> list[Finding]:
@@ -287,10 +308,10 @@ def _gradient(tracks: Tracks, k: int, both: NDArray[np.bool_]) -> Array:
 
 
 def _distance(tracks: Tracks, k: int, other: int) -> float:
-    """Rms displacement of the rods from one photograph to another [m]; NaN where they have no rod in common."""
+    """Rms displacement of the rods from one photograph to another [m]; NaN where few rods are in both."""
     both = tracks.present_in(k) & tracks.present_in(other)
     moved = tracks.position[other, both] - tracks.position[k, both]
-    return float(np.sqrt(np.mean(moved**2))) if len(moved) else np.nan
+    return float(np.sqrt(np.mean(moved**2))) if both.mean() > IN_BOTH else np.nan
 
 
 def _shorter_if_swapped(tracks: Tracks, step: Array, k: int) -> bool:

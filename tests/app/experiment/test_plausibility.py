@@ -77,3 +77,20 @@ def test_rods_in_the_other_half_of_a_split_box_are_not_beyond_its_side() -> None
     check_inside(experiment, tracks_at(np.array([[0.19, 0.05], [0.22, 0.15]])), walls)
     with pytest.raises(InputError, match="wall 'low': grain 1 lies 20 mm beyond it"):
         check_inside(experiment, tracks_at(np.array([[0.19, 0.05], [0.22, 0.05]])), walls)
+
+
+def test_one_wrong_place_of_a_later_photograph_is_not_blamed_on_the_walls() -> None:
+    corners = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]])
+    ends = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)  # the same upside down
+    walls = WallTracks(tuple("brtl"), np.repeat(ends[None], 2, axis=0), np.full(4, np.nan))
+    table = SimpleNamespace(file="walls.csv", arcs=None, corners=None)
+    experiment = SimpleNamespace(config=SimpleNamespace(walls=table, photographs=None), folder=Path("box"))
+    first = tracks_at(np.array([[0.02, 0.02], [0.05, 0.08], [0.08, 0.03]]))
+    place = np.concatenate([first.position, first.position])
+    place[1, 1, 0] = 5.0
+    given = np.repeat(first.status, 2, axis=0)
+    blank = np.full(given.shape, np.nan)
+    tracks = Tracks(first.id, first.radius, np.arange(2.0), place, blank, blank, blank, given)
+    with pytest.raises(InputError, match="beyond it") as refused:
+        check_inside(experiment, tracks, walls)
+    assert "look" not in str(refused.value)

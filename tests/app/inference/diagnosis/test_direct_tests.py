@@ -124,6 +124,22 @@ def test_a_return_of_the_loading_is_no_swap():
     assert examine_order(replace(tracks, position=tracks.position[[0, 1, 2, 3, 2, 1, 0, 1]])) == []
 
 
+def test_a_photograph_of_few_rods_is_not_repeated():
+    tracks = rolling_tracks()
+    few = tracks.position.copy()
+    few[4, 3:] = np.nan
+    status = np.where(np.isnan(few[..., 0]), np.uint8(TrackStatus.LOST), tracks.status)
+    few[4, :3] = few[3, :3]
+    assert examine_order(replace(tracks, position=few, status=status)) == []
+
+
+@pytest.mark.parametrize("creep", [(4e-4, -3e-4), (0.0, 8e-4)])
+def test_a_camera_that_moves_against_all_walls_leaves_no_wall_at_rest(creep):
+    shift = np.linspace(0.0, 1.0, FRAMES)[:, None, None] * np.array(creep)
+    tracks = rolling_tracks()
+    assert examine_walls(replace(tracks, position=tracks.position + shift), box()) == []
+
+
 def test_a_wall_that_rods_penetrate_while_it_rests_is_named():
     tracks, walls = rolling_tracks(), box()
     assert examine_walls(tracks, walls) == []
