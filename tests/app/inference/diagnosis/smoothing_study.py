@@ -38,6 +38,8 @@ def cubic(values: np.ndarray) -> np.ndarray:
     return fitted.reshape(values.shape)
 
 
+OVERSTATED = {"exact, 10 µm stated": 0.0, "1 µm, 10 µm stated": 1e-6, "2 µm, 10 µm stated": 2e-6}  # noise [m]
+STATED = 1e-5  # [m] precision
 FILTERS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "as given": lambda values: values,
     "average of 3": partial(moving_average, count=3),
@@ -72,6 +74,12 @@ def main() -> None:
         for name in options.scenarios:
             with tempfile.TemporaryDirectory() as folder:
                 made = make_scenario(Path(folder), name, seed, grains=options.grains, cache=options.cache)
+                for way, noise in OVERSTATED.items():
+                    exact = make_scenario(
+                        Path(folder) / way, name, seed, grains=options.grains, noise=noise, cache=options.cache
+                    ).folder
+                    tracks = read_inputs(load_experiment(exact, (f"tracks.precision={STATED}",))).tracks
+                    (named if find_smoothing(tracks) else unnamed)[way].append(f"{name} {seed}")
                 experiment = load_experiment(made.folder, ())
                 inputs = read_inputs(experiment)
                 for way, smooth in FILTERS.items():
@@ -82,9 +90,9 @@ def main() -> None:
                         keeper = SequenceKeeper()
                         results = infer_sequence(changed, keeper)
                         scores[way] += score(results.frames, true_forces(experiment, keeper.sequence))
-    for way in FILTERS:
+    for way in (*OVERSTATED, *FILTERS):
         count = len(named[way]) + len(unnamed[way])
-        wrong = named[way] if way == "as given" else unnamed[way]
+        wrong = named[way] if way == "as given" or way in OVERSTATED else unnamed[way]
         print(f"{way}: {len(named[way])} of {count} named; wrongly named or not: {', '.join(wrong) or 'none'}")
         if scores[way]:
             r, trust = np.array(scores[way]).T

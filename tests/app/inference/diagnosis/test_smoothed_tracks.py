@@ -135,6 +135,15 @@ def test_steady_motion_is_not_smoothed_where_the_noise_is_as_stated():
     assert not smoothed(grid(0.0) + np.linspace(0.0, 1.0, FRAMES)[:, None, None] ** 2 * drift, 1e-6)
 
 
+@pytest.mark.parametrize(("noise", "correlation", "named"), [
+    (0.2, 0.0, True), (0.04, 0.0, False), (0.6, 0.0, False), (0.2, 0.5, False), (0.2, -0.4, False),
+])  # fmt: skip
+def test_exact_tracks_whose_gaps_vary_by_motion_alone_are_not_smoothed(noise, correlation, named):
+    lags = np.array([correlation, 0.0, 0.0, 0.0, 0.0])
+    changes = GapChanges(noise * NOISE, lags, SMOOTH_MOTION + 0.3, 1000)
+    assert changes.smoothed(NOISE) == named
+
+
 def test_tracks_of_photographs_and_too_few_data_are_not_examined():
     tracks = tracks_of(moving_average(grid(), 5))
     tracked = replace(tracks, status=np.full(tracks.status.shape, TrackStatus.OK, np.uint8))
