@@ -140,6 +140,14 @@ def test_a_camera_that_moves_against_all_walls_leaves_no_wall_at_rest(creep):
     assert examine_walls(replace(tracks, position=tracks.position + shift), box()) == []
 
 
+def test_a_single_wall_does_not_show_a_camera_that_moves():
+    tracks = rolling_tracks()
+    rise = np.linspace(0.0, 1e-3, FRAMES)[:, None, None] * np.array([0.0, 1.0])
+    top = box().select(np.array([1]))
+    (found,) = examine_walls(replace(tracks, position=tracks.position + rise), top)
+    assert "penetrate wall 'top'" in found.evidence
+
+
 def test_a_wall_that_rods_penetrate_while_it_rests_is_named():
     tracks, walls = rolling_tracks(), box()
     assert examine_walls(tracks, walls) == []
