@@ -215,9 +215,9 @@ def arrange_arcs(
         )
     given = np.full((frame_count, len(names), 4), np.nan)
     given[frame, row] = np.column_stack([table.numbers("x"), table.numbers("y"), radius, angle])
+    still = _given_in_frame_0_alone(frame, row, len(names))
+    given[:, still] = given[0, still]
     for wall, name in enumerate(names):
-        if np.isfinite(given[0, wall, 0]) and np.isnan(given[1:, wall, 0]).all():
-            given[:, wall] = given[0, wall]
         for k in np.flatnonzero(np.isnan(given[:, wall, 0])).tolist():
             raise InputError(
                 table.file, f"frame {k}", f"has no row of wall {name!r}: give it in all frames, or in frame 0 alone"

@@ -57,11 +57,16 @@ def measure_precision(grains: Grains, snapshots: Sequence[Snapshot]) -> Precisio
     gaps, mean = gaps[:, mean <= 0.0], mean[mean <= 0.0]
     if len(mean) < MIN_GAPS:
         return None
-    sigma = NORMAL * float(np.median(np.abs(gaps[0] - 2.0 * gaps[1] + gaps[2]))) / np.sqrt(12.0)
+    sigma = noise_by_second_changes(gaps[0] - 2.0 * gaps[1] + gaps[2])
     if not sigma > 0.0:
         return None
     overlap = float(np.sqrt(max(np.mean(mean**2) - 2.0 / 3.0 * sigma**2, 0.0)))
     return Precision(sigma, overlap, len(mean))
+
+
+def noise_by_second_changes(change: Array) -> float:
+    """Robust standard deviation of a position component [m] by second changes of gaps g₋ − 2g + g₊ [m]."""
+    return NORMAL * float(np.median(np.abs(change))) / np.sqrt(12.0)
 
 
 def _triple_count(grains: Grains) -> int:

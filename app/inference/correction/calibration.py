@@ -84,7 +84,7 @@ def calibrate_tracks(
 
 
 def own_gap_error(found: Calibration) -> float:
-    """Compute the rms part of a gap [m] that was corrected as errors of single grains.
+    """Compute the rms part of a gap [m] that was corrected as errors of centres and radii which not all grains share.
 
     Where the grains hardly move against each other, such errors look like overlaps, which are corrected with them.
     """

@@ -12,6 +12,7 @@ from ...solver.assessment.penalties import limit_trust
 from ...solver.bodies.grains import Array
 from ...solver.bodies.rods import RodMaterial
 from ...solver.contacts.contacts import detect_contacts
+from ...solver.detection.precision import NORMAL, noise_by_second_changes
 from ...solver.frame_forces import FrameForces
 from ...tracks import Tracks, TrackStatus
 from ..correction.outliers import walls_in
@@ -23,7 +24,6 @@ REACH = 0.15  # [mean diameter] greatest gap of a pair in all photographs of a w
 QUIET = 0.25  # fraction of these pairs whose gaps change least: noise is most of that
 LAGS = 5  # [photographs]
 CLIP = 3.0  # standard deviations to which a change is limited, so that a few jumps do not decide
-NORMAL = 1.4826  # standard deviation over median absolute deviation
 # Chosen on 91 scenarios of seeds 20 and 22 (200 rods), as given and smoothed; the upper limit of the correlation and
 # the lower one of the noise on seed 42, so that exact tracks with an overstated precision, whose gaps vary by motion
 # alone, are not named. `python -m tests.app.inference.diagnosis.smoothing_study` counts both. Unnamed are mostly
@@ -120,11 +120,11 @@ def measure_gap_changes(tracks: Tracks) -> GapChanges | None:
     windows = [np.diff(_neighbouring_gaps(tracks, first, first + length), axis=0) for first in starts]
     quiet = np.concatenate([change[:, _rests(change)] for change in windows], axis=1)
     second, second_of_all = np.diff(quiet, axis=0), np.diff(np.concatenate(windows, axis=1), axis=0)
-    known = np.abs(second[np.isfinite(second)])
+    known = second[np.isfinite(second)]
     if not len(known):
         return None
     return GapChanges(
-        NORMAL * float(np.median(known)) / np.sqrt(12.0),
+        noise_by_second_changes(known),
         np.array([_correlation(quiet, lag) for lag in range(1, LAGS + 1)]),
         _correlation(second_of_all, 1),
         int(np.isfinite(second[1:] * second[:-1]).sum()),

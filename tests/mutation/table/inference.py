@@ -46,7 +46,7 @@ MUTANTS = [
         ("self.correlation[0] < CHANGES[1]", "self.correlation[0] < 2.0"),
         ("change[:, _rests(change)]", "change"),
         ("length = min(WINDOW, f)", "length = f"),
-        ("float(np.median(known)) / np.sqrt(12.0)", "float(np.median(known))"),
+        ("noise_by_second_changes(known)", "noise_by_second_changes(known) * 3.0"),
         ("return lag + 1 if", "return lag if"),
         ("limit_trust(frame, TRUST_OF_SMOOTHED, EXPECTED_OF_SMOOTHED", "limit_trust(frame, TRUST_OF_SMOOTHED, 1.0"),
     ),
