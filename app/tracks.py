@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Annotated, Any
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .solver.bodies.grains import Array
 from .solver.bodies.wall_shapes import STRAIGHT, all_sides, circle_parameters, outlines
-from .solver.quantity import Quantity
+from .solver.quantity import Quantity, quantities
 
 BAR, CORNER, UNSPECIFIED = 0, 1, -1  # meaning of the two points of a wall
 
@@ -193,6 +193,19 @@ class Tracks:
             None if self.failed_reason is None else self.failed_reason[part],
             self.inferred, self.boundary, None if self.fringes is None else self.fringes[part],
         )  # fmt: skip
+
+    def rearranged(self, row: NDArray[np.int64]) -> Tracks:
+        """Return the tracks with the poses of frame k that the rows `row[k]` (f, n) hold now."""
+        poses = {
+            each.name: values
+            for each in quantities(Tracks)
+            if each.quantity.dims.startswith("frame grain") and (values := getattr(self, each.name)) is not None
+        }
+        taken = {
+            name: np.take_along_axis(values, row.reshape(*row.shape, *[1] * (values.ndim - 2)), axis=1)
+            for name, values in poses.items()
+        }
+        return replace(self, **taken)
 
 
 def held_once(column: NDArray[Any]) -> NDArray[Any]:

@@ -19,7 +19,7 @@ from .boundary import correct_camera, correct_walls, measure_noise
 from .calibration import calibrate_tracks, known_radii, own_gap_error
 from .close_photographs import choose_span, count_alike
 from .friction import measure_friction, measure_resisting, refine_wall_friction, tuned_radii, use_unstated
-from .outliers import remove_outliers
+from .outliers import remove_outliers, restore_exchanged_ids
 from .radii import calibrate_with_radii, correct_exchanged_sizes, use_size_classes
 from .short_gaps import interpolate_short_gaps
 from .soft_grain_errors import correct_soft_grains
@@ -53,8 +53,9 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         A requested friction coefficient or coordination number cannot be determined.
     """
     walls, settings = inputs.walls, inputs.settings
-    walls, failed = complete_walls(inputs.tracks, walls)
-    given, size_remark = (inputs.tracks, "") if settings.calibration is None else correct_exchanged_sizes(inputs.tracks)
+    given, id_remark = restore_exchanged_ids(inputs.tracks)
+    walls, failed = complete_walls(given, walls)
+    given, size_remark = (given, "") if settings.calibration is None else correct_exchanged_sizes(given)
     tracks, outlier_remark = remove_outliers(given, walls)
     tracks, gap_remark = interpolate_short_gaps(tracks, walls)
     nothing_seen = len(failed) == tracks.frame_count
@@ -62,7 +63,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         settings = replace(settings, boundary=None, calibration=None, coordination=None)
     overlap, as_given = settings.overlap_of(tracks.radius), settings.calibration is None
     calibration = tuning = boundary = lens = None
-    remarks, material = [outlier_remark, gap_remark, "", "", "", "", "", "", size_remark], inputs.material
+    remarks, material = [outlier_remark, gap_remark, "", "", "", "", "", "", size_remark, id_remark], inputs.material
     if settings.calibration is not None:
         if settings.sequence.uses_positions:
             material, remarks[6] = assume_softness(material, tracks, walls, failed)

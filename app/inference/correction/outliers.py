@@ -1,4 +1,4 @@
-"""Poses that contradict the photographs beside theirs: a rod that jumps against its neighbours, into others or back."""
+"""Poses that contradict the photographs beside theirs: rods that jump into others or back, or exchange their names."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ...solver.bodies.grains import Array
 from ...solver.bodies.rods import RodMaterial
 from ...solver.bodies.walls import Walls
 from ...solver.contacts.contacts import Contacts, detect_contacts, measure_pairs
+from ...solver.inferred.exchanged_ids import find_exchanged_ids
 from ...solver.inferred.interpolated_poses import NEIGHBOURS, ROBUST, interpolate_poses, neighbour_rows
 from ...tracks import Tracks, TrackStatus, WallTracks
 
@@ -24,6 +25,7 @@ DEEP = 6.0  # robust standard deviations above the usual overlap, and NOISE of a
 ONE_SIDED = 1.2  # times the least jump, where only photographs on one side show the motion
 PASSES = 8  # an outlier hides the one before or after it until it is interpolated
 MOST = 0.1  # of the poses of a frame: where more jump, the packing rearranges
+NAMED, LISTED = 6, 4  # rods of one photograph, and photographs, that a sentence lists
 
 
 def remove_outliers(tracks: Tracks, walls: WallTracks | None = None) -> tuple[Tracks, str]:
@@ -51,6 +53,29 @@ def remove_outliers(tracks: Tracks, walls: WallTracks | None = None) -> tuple[Tr
         f"{count} poses in {frames} photographs jump against their neighbours: they count as lost; check these rods"
     )
     return without_poses(tracks, outlier), remark
+
+
+def restore_exchanged_ids(tracks: Tracks) -> tuple[Tracks, str]:
+    """Give every rod the name under which it was seen first, where a tracker has confused names.
+
+    Returns
+    -------
+    Tracks
+    str
+        Which rods have the names of which others, and from which photograph on; empty where none has.
+    """
+    row = find_exchanged_ids(np.where(tracks.present[..., None], tracks.position, np.nan))
+    restored, events = tracks.rearranged(row), []
+    for k in range(1, tracks.frame_count):
+        changed = (row[k] != row[k - 1]) & restored.present_in(k)
+        if changed.any():
+            grains = np.flatnonzero(changed)[:NAMED]
+            names = (f"{tracks.id[i]} as {tracks.id[j]}" for i, j in zip(grains, row[k][grains], strict=True))
+            events.append(f"{', '.join(names)}{', …' if changed.sum() > NAMED else ''} from photograph {k} on")
+    if not events:
+        return tracks, ""
+    words = "; ".join(events[:LISTED]) + ("; …" if len(events) > LISTED else "")
+    return restored, f"rods stand in the table under the names of others, which is undone: {words}"
 
 
 def without_poses(tracks: Tracks, lost: NDArray[np.bool_]) -> Tracks:

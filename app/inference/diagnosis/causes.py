@@ -63,6 +63,10 @@ CAUSES: dict[str, Cause] = {
         "a rod that jumps for one photograph seems to slide; its pose is interpolated there",
         "look at these rods in these photographs",
     ),
+    "exchanged_ids": Cause(
+        "these rods seem to jump to each other's places, with each other's radii",
+        "a run gives every rod the name under which it was seen first: correct the table of the tracks",
+    ),
     "missing_poses": Cause(
         "contacts of rods that photographs lack are interpolated, or missing",
         "find these rods in the photographs",

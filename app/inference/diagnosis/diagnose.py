@@ -20,6 +20,7 @@ from ...results.finding import Finding
 from ...results.results import Results
 from ...solver.bodies.grains import Array
 from ..correction.correct_sequence import complete_walls, correct_sequence
+from ..correction.outliers import restore_exchanged_ids
 from ..inputs import Inputs
 from .causes import finding
 from .direct_tests import (
@@ -84,9 +85,12 @@ def diagnose(
     list of Finding
         Empty where nothing contradicts the model.
     """
-    walls, failed = complete_walls(inputs.tracks, inputs.walls)
-    if len(failed) == inputs.tracks.frame_count:
-        return []
+    restored, exchanged = restore_exchanged_ids(inputs.tracks)
+    inputs = replace(inputs, tracks=restored)
+    names = [finding("exchanged_ids", exchanged)] if exchanged else []
+    walls, failed = complete_walls(restored, inputs.walls)
+    if len(failed) == restored.frame_count:
+        return names
     tracks, walls, camera = undistorted(inputs, walls, failed, camera=not undisturbed)
     found = [*examine_rotations(tracks, walls), *examine_order(tracks), *examine_smoothing(inputs.tracks)]
     found += examine_walls(tracks, walls) or examine_wall_times(tracks, walls) or examine_wall_places(tracks, walls)
@@ -105,7 +109,7 @@ def diagnose(
         found = [each for each in found if each.cause != "not_explained"]
     if found:  # wrong radii look like a few jumps
         poses = [each for each in poses if each.cause != "outlier_tracks"]
-    return [*found, *camera, *poses]
+    return [*found, *names, *camera, *poses]
 
 
 def _compare_rivals(

@@ -220,7 +220,8 @@ def examine_poses(tracks: Tracks, impossible: NDArray[np.bool_]) -> list[Finding
         subject = "1 pose jumps against its" if count == 1 else f"{count} poses jump against their"
         where = "photograph" if len(frames) == 1 else "photographs"
         found.append(finding("outlier_tracks", f"{subject} neighbours and back, in {where} {words}"))
-    missing = 1.0 - float(tracks.present.mean())
+    seen = tracks.present.any(axis=0)
+    missing = 1.0 - float(tracks.present[:, seen].mean()) if seen.any() else 0.0
     if MISSING < missing < 1.0:
         found.append(finding("missing_poses", f"{100.0 * missing:.0f} % of the poses are missing"))
     return found

@@ -42,6 +42,7 @@ TRUE_CAUSE: dict[ScenarioName, tuple[str, ...]] = {
     ),
     "rising_lens": ("lens", "not_explained"),
     "outliers": ("outlier_tracks",), "one_jump": ("outlier_tracks",), "missing_poses": ("missing_poses",),
+    "exchanged_ids": ("exchanged_ids",),
     "base_friction": ("base_friction",), "smooth_walls": ("wall_friction",), "rough_walls": ("wall_friction",),
     "smooth_walls_spread": ("wall_friction",), "cohesion": ("adhesion",), "strong_cohesion": ("adhesion",),
     "rolling": ("rolling_resistance",),

@@ -20,6 +20,7 @@ WRONG_CLASS = 0.1  # of the rods
 MISSTATED = 0.2  # of the rods whose radii are stated too large by CLASS_ERROR
 CLASS_ERROR = 0.02  # of one class of radii
 INSIDE = 2e-3  # [m], by which a side is stated inside the packing
+EXCHANGED = 0.02  # of the rods, each with the one nearest to it
 JUMP = 1e-3  # [m] of one rod in one photograph
 OVERHANG = 0.05  # [m] of the bars beyond the packing at either end
 CORRELATED_NOISE, CORRELATION = 1e-5, 0.9  # [m] of a position component; from photograph to photograph
@@ -141,6 +142,22 @@ def confuse_classes(observed: ObservedData, rng: np.random.Generator) -> Observe
     chosen = rng.permutation(len(radius))[: round(WRONG_CLASS * len(radius))]
     radius[chosen] = classes[(np.searchsorted(classes, radius[chosen]) + 1) % len(classes)]
     return replace(observed, radius=radius)
+
+
+def exchange_ids(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """State rods under the names of their nearest neighbours from the middle of the sequence on, some pairs of them."""
+    position, middle = observed.position.copy(), len(observed.position) // 2
+    rotation = None if observed.rotation is None else observed.rotation.copy()
+    row = np.arange(len(observed.radius))
+    for one in rng.permutation(len(row))[: max(round(EXCHANGED * len(row)), 1)].tolist():
+        apart = np.linalg.norm(position[middle] - position[middle, one], axis=1)
+        other = int(np.argsort(apart)[1])
+        if row[one] == one and row[other] == other:
+            row[one], row[other] = other, one
+    position[middle:] = position[middle:, row]
+    if rotation is not None:
+        rotation[middle:] = rotation[middle:, row]
+    return replace(observed, position=position, rotation=rotation)
 
 
 def extend_bars(observed: ObservedData, rng: np.random.Generator) -> ObservedData:

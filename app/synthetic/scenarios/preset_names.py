@@ -26,5 +26,5 @@ ScenarioName = Literal[
     "theta_sign", "theta_zero", "theta_degrees", "theta_absent",
     "mu_01", "mu_05", "walls_late", "left_late", "top_fixed", "wall_inside",
     "aspect_03", "aspect_1", "lens_03", "class_2", "some_radii", "wrong_class", "overhang", "outliers", "one_jump",
-    "missing_poses", "stepped_some_radii", "annulus_some_radii", "rising_lens",
+    "missing_poses", "exchanged_ids", "stepped_some_radii", "annulus_some_radii", "rising_lens",
 ]  # fmt: skip

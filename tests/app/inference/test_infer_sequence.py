@@ -204,3 +204,16 @@ def test_contacts_of_an_interpolated_rod_bear_force_and_are_marked(contradicted)
     assert (source == ContactSource.INTERPOLATED).sum() >= 3
     assert (forces.source[~theirs] != ContactSource.INTERPOLATED).all()
     assert found.tracks.lost[frame].sum() == 1
+
+
+@pytest.mark.thorough
+def test_confused_names_change_no_force_and_are_named(contradicted):
+    inputs, results = contradicted
+    row = np.tile(np.arange(inputs.tracks.grain_count), (FRAMES, 1))
+    row[FRAMES // 2 :, :3] = [1, 2, 0]
+    confused = infer_sequence(replace(inputs, tracks=inputs.tracks.rearranged(row)))
+    for given, found in zip(results.frames, confused.frames, strict=True):
+        assert np.array_equal(given.contacts.key, found.contacts.key)
+        assert np.array_equal(given.fn, found.fn)
+        assert given.trust == found.trust
+    assert "under the names of others" in confused.frames[0].reason

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.inference.correction.outliers import find_outliers, remove_outliers
+from rodsight.inference.correction.outliers import find_outliers, remove_outliers, restore_exchanged_ids
 from rodsight.solver.bodies.wall_shapes import IN, circle_ends
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
@@ -164,3 +164,45 @@ def test_a_jump_in_the_last_photograph_must_be_greater_than_within_the_sequence(
     last, greater = (sheared_tracks([(FRAMES - 1, ROD, (move, 0.0))]) for move in (2.8e-4, 3.6e-4))
     assert not find_outliers(replace(last, radius=radius)).any()
     assert np.argwhere(find_outliers(replace(greater, radius=radius))).tolist() == [[FRAMES - 1, ROD]]
+
+
+def test_confused_names_are_given_back_with_all_of_their_poses():
+    tracks = sheared_tracks()
+    tracks = replace(tracks, zncc=np.arange(FRAMES * N, dtype=float).reshape(FRAMES, N), fringes=np.ones((FRAMES, N)))
+    fields = ("position", "rotation", "sigma", "zncc", "status", "fringes")
+    confused = {name: getattr(tracks, name).copy() for name in fields}
+    for each in confused.values():
+        each[3:, [ROD, ROD + 1]] = each[3:, [ROD + 1, ROD]]
+    found, words = restore_exchanged_ids(replace(tracks, **confused))
+    assert words.endswith(f"{ROD} as {ROD + 1}, {ROD + 1} as {ROD} from photograph 3 on")
+    for name in (*fields, "radius", "id"):
+        assert np.array_equal(getattr(found, name), getattr(tracks, name)), name
+
+
+def test_a_rod_that_goes_on_under_a_new_name_is_listed_without_the_name_that_nobody_has():
+    tracks = sheared_tracks()
+    position = np.insert(tracks.position, N, np.nan, axis=1)
+    position[4:, [ROD, N]] = position[4:, [N, ROD]]
+    flat = np.full((FRAMES, N + 1), NOISE)
+    renamed = Tracks(
+        np.arange(N + 1), np.full(N + 1, 0.00797), tracks.time, position, np.zeros_like(flat), flat,
+        np.full_like(flat, np.nan), np.where(np.isnan(position[..., 0]), TrackStatus.LOST, TrackStatus.GIVEN),
+    )  # fmt: skip
+    words = restore_exchanged_ids(renamed)[1]
+    assert words.endswith(f": {ROD} as {N} from photograph 4 on")
+
+
+def test_names_of_their_own_stay_without_a_word():
+    tracks = sheared_tracks()
+    found, words = restore_exchanged_ids(tracks)
+    assert words == ""
+    assert found is tracks
+
+
+def test_every_photograph_with_confused_names_is_listed_up_to_a_few():
+    tracks, row = sheared_tracks(), np.tile(np.arange(N), (FRAMES, 1))
+    for k in range(1, FRAMES):
+        row[k:, [7 * k, 7 * k + 1]] = [7 * k + 1, 7 * k]
+    words = restore_exchanged_ids(tracks.rearranged(row))[1]
+    assert words.count("photograph") == 4
+    assert words.endswith("; …")

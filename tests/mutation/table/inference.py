@@ -4,6 +4,7 @@ from tests.mutation.mutant import mutants_of
 
 TESTS = "tests/app/inference"
 PREDICTION = "tests/app/study/test_predictions.py"
+OUTLIERS = f"{TESTS}/test_outliers.py"
 
 MUTANTS = [
     *mutants_of(
@@ -13,6 +14,31 @@ MUTANTS = [
         ("radius=then.radius + found.correction", "radius=then.radius"),
         ("first is None or not has_radius_errors(", "first is None or has_radius_errors("),
         ("radius=found.shared_radius(tracks.radius)", "radius=-found.shared_radius(tracks.radius)"),
+    ),
+    *mutants_of(
+        "solver/inferred/exchanged_ids.py",
+        "tests/solver/inferred/test_exchanged_ids.py",
+        ("expected[placed] += np.median(now[near] - last[near], axis=1)", "expected[placed] += 0.0"),
+        ("last = np.where(np.isfinite(now), now, moved)", "last = np.where(np.isfinite(now), now, last)"),
+        ("~(apart <= FAR * distance)", "~(apart <= 5.0 * distance)"),
+        ("length < NEAR * distance[sought]", "length < 9.0 * distance[sought]"),
+        ("& np.isfinite(now[sought, 0]) & fits", "& False"),
+        ("fits &= ~open_ended", "fits[:] = False"),
+        ("row[one] = former[other]", "row[one] = other"),
+        ("row[np.setdiff1d(other, one)] = former[np.setdiff1d(one, other)]", "pass"),
+        ("row[k] = row[k - 1]", "pass"),
+    ),
+    *mutants_of(
+        "app/inference/correction/outliers.py",
+        OUTLIERS,
+        ("if changed.any():\n            grains", "if True:\n            grains"),
+        ("changed = (row[k] != row[k - 1]) & restored.present_in(k)", "changed = row[k] != row[k - 1]"),
+    ),
+    *mutants_of(
+        "app/tracks.py",
+        OUTLIERS,
+        ('each.quantity.dims.startswith("frame grain")', 'each.quantity.dims == "frame grain xy"'),
+        ("axis=1)\n            for name, values", "axis=0)\n            for name, values"),
     ),
     *mutants_of(
         "solver/boundary/section_shape.py",

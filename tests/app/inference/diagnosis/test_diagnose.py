@@ -75,6 +75,21 @@ def test_without_a_clear_winner_nothing_is_blamed(scores, rises):
     assert causes(SOUND) == []
 
 
+def test_confused_names_are_named_and_hide_nothing_else():
+    tracks = INPUTS.tracks
+    row = np.tile(np.arange(tracks.grain_count), (tracks.frame_count, 1))
+    row[1:, [3, 4]] = [4, 3]
+    confused = replace(INPUTS, tracks=tracks.rearranged(row))
+    assert [each.cause for each in diagnose(confused, None)] == ["exchanged_ids"]
+    lost = np.arange(tracks.grain_count) % 4 == 2
+    poor = replace(
+        tracks,
+        position=np.where(lost[:, None] & (np.arange(tracks.frame_count) > 0)[:, None, None], np.nan, tracks.position),
+    )
+    found = diagnose(replace(INPUTS, tracks=poor.rearranged(row)), None)
+    assert [each.cause for each in found] == ["exchanged_ids", "missing_poses"]
+
+
 def test_every_rival_has_a_documented_cause_and_changes_the_input():
     rivals = list(rivals_of(INPUTS))
     assert {each.cause for each in rivals} <= set(CAUSES)
