@@ -19,6 +19,7 @@ from ..solver.assessment.fringe_pressures import FringePressures, compare_with_f
 from ..solver.assessment.intervals.force_intervals import widen_scale
 from ..solver.assessment.intervals.scale_sd import FIRST_BY_SECOND
 from ..solver.assessment.intervals.statistic_intervals import widen_for_friction
+from ..solver.assessment.intervals.wall_sensors import scale_error
 from ..solver.assessment.penalties import limit_for_few_photographs, penalise_friction
 from ..solver.convex.friction_check import FrictionCheck
 from ..solver.frame_forces import FrameForces, FrameStatus
@@ -86,8 +87,12 @@ def infer_sequence(
     count, measured = len(frames), sequence.friction_measured
     smoothed = find_smoothing(inputs.tracks) is not None
 
+    ratio = replace(unsolved, frames=frames, statistics=statistics).wall_force_ratio()
+
     def assess(k: int) -> FrameForces:
         frame = limit_for_few_photographs(penalise_friction(frames[k], check, measured=measured), count)
+        contradicted = scale_error(ratio, frame.scale_sd)
+        frame = widen_scale(frame, contradicted) if contradicted else frame
         return limit_for_smoothing(frame) if smoothed else frame
 
     assessed = LazySequence(count, assess)

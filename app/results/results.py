@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..solver.assessment.fringe_pressures import FringePressures
+from ..solver.assessment.intervals.wall_sensors import compare_wall_forces
 from ..solver.bodies.grains import Array, Grains
+from ..solver.bodies.wall_shapes import STRAIGHT, outward_normals
 from ..solver.boundary.boundary_correction import Boundary
 from ..solver.boundary.camera_distortion import CameraDistortion
 from ..solver.calibration.calibrate import Calibration
@@ -102,3 +104,11 @@ class Results:
         forces = self.frames[frame]
         given = np.full(forces.contacts.count, np.nan) if forces.friction is None else forces.friction
         return np.where(np.isfinite(given), given, self.friction)
+
+    def wall_force_ratio(self) -> Array:
+        """Inferred over recorded normal forces on walls (w,), from the second frame on; NaN without a sensor."""
+        if self.walls.force is None or len(self.statistics) < 2:
+            return np.full(self.walls.count, np.nan)
+        recorded = np.where((self.walls.sides == STRAIGHT)[:, None], self.walls.force, np.nan)
+        inferred = np.stack([each.wall_force for each in self.statistics])
+        return compare_wall_forces(inferred[1:], recorded[1:], outward_normals(self.walls.endpoints[1:]))

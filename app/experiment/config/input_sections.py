@@ -247,7 +247,8 @@ class WallsSection(Section):
         default=None,
     )
     forces: str | None = key(
-        "Table frame,wall,fx,fy of the packing's force on walls in newtons, from sensors; for comparison only.",
+        "Table frame,wall,fx,fy of the packing's force on walls in newtons, from sensors. Forces are not fitted to it: "
+        "where it contradicts their scale, the scale's standard deviation grows.",
         default=None,
     )
     plates: dict[str, Plate] = key("Further keys of walls by their names: the tables [walls.NAME].", default={})

@@ -81,6 +81,10 @@ CAUSES: dict[str, Cause] = {
     "wall_at_rest": Cause(
         "rods seem to penetrate the wall or to leave it", "give the motion of the wall in every photograph"
     ),
+    "wall_forces": Cause(
+        "a load, a sensor or the forces are wrong, and with a load the scale of all forces",
+        "compare names, signs and units of the recorded forces with the loads of the same walls",
+    ),
     "stretched_picture": Cause(
         "rods that touch seem apart in one direction and overlap in the other",
         "calibrate the camera: x and y have different scales; a run removes it as far as the gaps show it",

@@ -18,6 +18,7 @@ from ...process.machine.linear_algebra import one_thread_each
 from ...process.progress import Progress, no_progress
 from ...results.finding import Finding
 from ...results.results import Results
+from ...solver.assessment.intervals.wall_sensors import contradicting
 from ...solver.bodies.grains import Array
 from ..correction.correct_sequence import complete_walls, correct_sequence
 from ..correction.outliers import restore_exchanged_ids
@@ -162,7 +163,17 @@ def diagnose_solved(
         first = int(np.nanargmin(mean))
         trial = solve_trial(inputs, first=first)
         return diagnose(inputs, trial, progress, first=first, undisturbed=undisturbed)
-    return diagnose(inputs, None, sliding=slides, undisturbed=undisturbed)
+    found = diagnose(inputs, None, sliding=slides, undisturbed=undisturbed)
+    return [*found, *_examine_wall_forces(results)]
+
+
+def _examine_wall_forces(results: Results) -> list[Finding]:
+    """Compare forces that are expected to be right with those that sensors record on the walls."""
+    ratio = results.wall_force_ratio()
+    if not contradicting(ratio):
+        return []
+    known = [f"{name} {each:.2f}" for name, each in zip(results.walls.name, ratio, strict=True) if np.isfinite(each)]
+    return [finding("wall_forces", f"inferred normal forces on walls over the recorded ones: {', '.join(known)}")]
 
 
 def _examine_sliding(inputs: Inputs, first: int) -> list[Finding]:

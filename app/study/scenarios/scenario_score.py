@@ -172,10 +172,11 @@ def _inputs(experiment: Experiment) -> Inputs:
 
 
 def read_scenario(experiment: Experiment) -> tuple[Tracks, WallTracks | None]:
-    """Read the tracks, boundary and walls of an experiment. Raises InputError."""
+    """Read the tracks, boundary and walls of an experiment, which sensors do not judge. Raises InputError."""
     tracks = read_tracks(experiment)
     walls = read_walls(experiment, tracks.frame_count)
-    return apply_boundary(experiment, tracks, walls), walls
+    tracks = apply_boundary(experiment, tracks, walls)
+    return tracks, None if walls is None else replace(walls, force=None)
 
 
 def true_forces(experiment: Experiment, sequence: CorrectedSequence) -> tuple[tuple[Keys, Array], ...]:

@@ -22,6 +22,7 @@ from rodsight.results.results import Results
 from rodsight.robustness.design import Case
 from rodsight.robustness.factors import FIRST_COMPARED
 from rodsight.robustness.study import Nominal, measure_case
+from rodsight.solver.bodies.wall_shapes import OUT
 from rodsight.solver.contacts.contacts import ContactSource
 from rodsight.solver.frame_forces import FrameForces, FrameStatus
 from rodsight.synthetic.scenarios.scenario_folder import make_scenario
@@ -217,3 +218,20 @@ def test_confused_names_change_no_force_and_are_named(contradicted):
         assert np.array_equal(given.fn, found.fn)
         assert given.trust == found.trust
     assert "under the names of others" in confused.frames[0].reason
+
+
+@pytest.mark.thorough
+def test_sensors_that_contradict_the_scale_widen_it_and_change_no_force(contradicted):
+    inputs, results = contradicted
+    force = np.stack([each.wall_force for each in results.statistics])
+    sensed = infer_sequence(replace(inputs, walls=replace(inputs.walls, force=force / 1.6)))
+    agreeing = replace(results, walls=replace(results.walls, force=force))
+    assert agreeing.wall_force_ratio() == pytest.approx(1.0)
+    assert sensed.wall_force_ratio() == pytest.approx(1.6)
+    for given, found in zip(results.frames, sensed.frames, strict=True):
+        assert np.array_equal(given.fn, found.fn)
+        assert found.scale_sd == pytest.approx(np.hypot(given.scale_sd, 0.6))
+        assert (found.fn_sd >= given.fn_sd).all()
+    circles = replace(agreeing.walls, side=np.full(agreeing.walls.count, OUT, np.int8))
+    assert np.isnan(replace(agreeing, walls=circles).wall_force_ratio()).all()
+    assert np.isnan(replace(agreeing, walls=replace(agreeing.walls, force=None)).wall_force_ratio()).all()

@@ -92,6 +92,18 @@ MUTANTS = [
         ("if not evidence.assessed or math.isnan(evidence.correction)", "if math.isnan(evidence.correction)"),
     ),
     *mutants_of(
+        "solver/assessment/intervals/wall_sensors.py",
+        "tests/solver/assessment/intervals/test_wall_sensors.py",
+        ("(size >= SEEN * size.max(initial=0.0))", "True"),
+        ("known = np.isfinite(stated) & np.isfinite(along)", "known = np.isfinite(stated)"),
+        ("each * stated, 0.0", "each * each, 0.0"),
+        ("> LIMIT).any()", "> LIMIT).all()"),
+        ("float(np.median(known))", "float(known.mean())"),
+        ("abs(abs(float(", "abs((float("),
+        ("np.hypot(scale_sd, OF_WALL)", "OF_WALL"),
+        ("np.hypot(scale_sd, OF_WALL)", "scale_sd"),
+    ),
+    *mutants_of(
         "app/inference/correction/outliers.py",
         OUTLIERS,
         ("2.0 * position[k - 1] - position[k - 2]", "position[k - 1]"),

@@ -90,6 +90,20 @@ def test_confused_names_are_named_and_hide_nothing_else():
     assert [each.cause for each in found] == ["exchanged_ids", "missing_poses"]
 
 
+@pytest.mark.parametrize(("ratio", "named"), [([1.0, 1.1], []), ([1.0, 1.5], ["wall_forces"]), ([np.nan] * 2, [])])
+@pytest.mark.parametrize("expected", [0.98, 0.5])
+def test_sensors_are_named_where_forces_are_expected_to_be_right(monkeypatch, ratio, named, expected):
+    monkeypatch.setattr(module, "diagnose", lambda *_, **__: [])
+    monkeypatch.setattr(module, "solve_trial", lambda *_, **__: None)
+    results = SimpleNamespace(
+        friction_check=None, frames=[SimpleNamespace(expected_correlation=expected)] * 6,
+        walls=SimpleNamespace(name=("top", "left")), wall_force_ratio=lambda: np.array(ratio),
+    )  # fmt: skip
+    found = module.diagnose_solved(INPUTS, results)
+    assert [each.cause for each in found] == (named if expected > 0.9 else [])
+    assert all("top 1.00, left 1.50" in each.evidence for each in found)
+
+
 def test_every_rival_has_a_documented_cause_and_changes_the_input():
     rivals = list(rivals_of(INPUTS))
     assert {each.cause for each in rivals} <= set(CAUSES)
