@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 GOOD, POOR = 0.9, 0.75  # expected r(f_n) from which on nothing is wrong, and below which something is
 CORRECTED = (
+    "exchanged_ids",
     "outlier_tracks",
     "missing_poses",
     "photograph_repeated",
@@ -46,6 +47,10 @@ NO_EXPECTATION = (math.nan, math.nan, math.nan)
 NOT_PREDICTED = (
     "The accuracy of the forces is not predicted: a prediction needs grains and walls seen in two consecutive "
     "photographs."
+)
+NO_FORCES = (
+    "Something is wrong: no forces of the first photographs are in equilibrium. Check radii, walls and loads, and whether "
+    "rods are missing."
 )
 
 
@@ -146,7 +151,8 @@ def predict_accuracy(
         found = diagnose(inputs, doubted, progress)
         if trial is not None and trial.expected[0] >= FITTING:
             found = [each for each in found if each.cause != "friction"]
-        return Prediction(quality, trial, diagnosis=tuple(found))
+        unsolved = trial is None or math.isnan(trial.expected[0])
+        return Prediction(quality, trial, NO_FORCES if unsolved and quality is not None else "", tuple(found))
     except UndeterminedError as error:
         return Prediction(quality, None, f"The first photographs alone do not determine everything: {error}.")
 

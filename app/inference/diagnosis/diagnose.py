@@ -24,6 +24,7 @@ from ..correction.correct_sequence import complete_walls, correct_sequence
 from ..correction.outliers import restore_exchanged_ids
 from ..inputs import Inputs
 from .causes import finding
+from .data_quality import measure_data_quality
 from .direct_tests import (
     examine_inertia,
     examine_order,
@@ -49,6 +50,7 @@ DOUBTFUL = 0.93  # expected r of some photographs of a solved test below which r
 DOUBTFUL_GAP = 0.1  # least power gap of the friction check above which what resists the sliding is examined
 UNEXPLAINED = 0.85  # expected r below which something is wrong although no cause wins
 FEW_OUTLIERS = 0.003  # fraction of the poses that jump, below which they do not explain poor forces
+GAP_SHOWN = 0.5  # of the mean gap that wrong radii of all hard rods cause: with less they are not wrong
 LEAST_GRAINS = (
     100  # of a packing whose rivals are compared: the evidence of fewer varies by chance as much as by causes
 )
@@ -117,7 +119,8 @@ def _compare_rivals(
     inputs: Inputs, trial: Trial, progress: Progress, first: int, excluded: Collection[str]
 ) -> list[Finding]:
     """Solve the rivals of the geometry, and name the one that clearly wins unless its cause is excluded."""
-    rivals = list(rivals_of(inputs))
+    offset = math.nan if trial.soft else _mean_gap(inputs)
+    rivals = [each for each in rivals_of(inputs) if not each.gap * offset < GAP_SHOWN * each.gap**2]
     rise: dict[str, tuple[float, str]] = {}
     for done, rival in enumerate(rivals):
         progress("diagnosing", done, len(rivals))
@@ -186,6 +189,12 @@ def _examine_sliding(inputs: Inputs, first: int) -> list[Finding]:
         return [] if sequence.settings.soft else examine_resistance(sequence)
     except (UndeterminedError, ValueError, FloatingPointError):  # these photographs do not show it
         return []
+
+
+def _mean_gap(inputs: Inputs) -> float:
+    """Mean gap of touching rods over their mean diameter, by the stated radii; NaN: unknown."""
+    quality = measure_data_quality(inputs.tracks, inputs.walls)
+    return math.nan if quality is None else quality.gap_offset / quality.diameter
 
 
 def _mean(values: Array) -> float:

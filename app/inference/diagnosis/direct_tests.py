@@ -33,6 +33,9 @@ SORTED = 0.4  # … which must make the path shorter by so much
 REPEATED = 0.1  # displacement of a step over the median step below which a photograph is repeated …
 STILL = 1.5  # … or over that of noise alone
 MOVES = 4.0  # noise that the median step must exceed for that
+EVEN = 0.25  # standard deviation of all other steps over their mean up to which one rest is a photograph taken twice
+SAME = 0.1  # displacement over that of noise, below which both are one photograph
+OUTLYING = 0.95  # quantile of the displacements above which a rod may be an outlier
 DRIFT_SIGMAS = 15.0  # standard deviations of a position by which rods may leave or penetrate a wall …
 DRIFT = 0.02  # … and fraction of the mean radius
 TOGETHER = 0.2  # of the greatest change of a gap at a wall: what a common translation of all rods may leave
@@ -161,13 +164,23 @@ def examine_order(tracks: Tracks) -> list[Finding]:
     elif shorter := _shortened_by_sorting(tracks, step):
         words = f"in another order the motion is {100.0 * shorter:.0f} % shorter, and its steps are more even"
         found.append(finding("photographs_swapped", words))
-    repeated = (
-        np.flatnonzero(step < max(REPEATED * usual, STILL * noise)) if usual > MOVES * noise else np.empty(0, np.int64)
-    )
+    repeated = np.flatnonzero(_nothing_moves(step, noise)) if usual > MOVES * noise else np.empty(0, np.int64)
     if len(repeated):
         words = ", ".join(f"{k + 1}" for k in repeated[:4].tolist())
         found.append(finding("photograph_repeated", f"nothing moves from the photograph before to photograph {words}"))
     return found
+
+
+def _nothing_moves(step: Array, noise: float) -> NDArray[np.bool_]:
+    """Which steps (f − 1,) [m] lead to the same photograph again: less than noise, or the only one in even motion.
+
+    A packing at rest moves by its noise, too.
+    """
+    still = step < max(REPEATED * float(np.nanmedian(step)), STILL * noise)
+    others = step[~still & np.isfinite(step)]
+    if still.sum() == 1 and others.std() < EVEN * others.mean():
+        return still
+    return step < SAME * noise
 
 
 def examine_walls(tracks: Tracks, walls: WallTracks) -> list[Finding]:
@@ -309,10 +322,12 @@ def _gradient(tracks: Tracks, k: int, both: NDArray[np.bool_]) -> Array:
 
 
 def _distance(tracks: Tracks, k: int, other: int) -> float:
-    """Rms displacement of the rods from one photograph to another [m]; NaN where few rods are in both."""
+    """Rms displacement of all rods but outliers from one photograph to another [m]; NaN where few are in both."""
     both = tracks.present_in(k) & tracks.present_in(other)
-    moved = tracks.position[other, both] - tracks.position[k, both]
-    return float(np.sqrt(np.mean(moved**2))) if both.mean() > IN_BOTH else np.nan
+    square = np.mean((tracks.position[other, both] - tracks.position[k, both]) ** 2, axis=1)
+    if not both.mean() > IN_BOTH:
+        return np.nan
+    return float(np.sqrt(np.mean(square[square <= np.quantile(square, OUTLYING)])))
 
 
 def _shorter_if_swapped(tracks: Tracks, step: Array, k: int) -> bool:

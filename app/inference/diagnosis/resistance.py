@@ -18,7 +18,7 @@ from .data_quality import measure_data_quality
 # that only push explain the noise of contacts at rest worse than forces of either sign. Sheared packings slide at .2
 # and more; under a rising pressure, or nearly jammed, at less than .06, and there causes were named wrongly.
 LEAST_SLIDING = 0.1
-NEED_SLIDING = ("friction", "wall_friction", "adhesion")
+NEED_SLIDING = ("friction", "wall_friction", "adhesion", "photographs_reversed")
 LEAST_NAMED = 0.005  # of the mean force: a lesser drag or attraction explains nothing, whatever else was fitted with it
 
 

@@ -24,6 +24,7 @@ class Rival:
     cause: str
     words: str  # the assumption
     change: Callable[[Inputs], Inputs]
+    gap: float = 0.0  # over a diameter, mean gap of touching hard rods in the given input if it is true; 0: any
 
 
 def rivals_of(inputs: Inputs) -> Iterator[Rival]:
@@ -31,7 +32,7 @@ def rivals_of(inputs: Inputs) -> Iterator[Rival]:
     for stretch in STRETCHES:
         yield Rival("stretched_picture", f"x is stretched by {-100.0 * stretch:g} %", _stretched(stretch))
     for error in RADIUS_ERRORS:
-        yield Rival("all_radii", f"all radii are stated {_wrong_by(error)}", _with_radii(1.0 + error))
+        yield Rival("all_radii", f"all radii are stated {_wrong_by(error)}", _with_radii(1.0 + error), error)
     classes = np.unique(np.round(inputs.tracks.radius, 6))
     if 1 < len(classes) <= MOST_CLASSES:
         for error in CLASS_ERRORS:

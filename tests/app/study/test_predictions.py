@@ -72,6 +72,17 @@ def test_a_remark_states_why_there_is_no_prediction():
     assert Prediction(GOOD, None, "The first photographs determine no friction.").verdict().endswith("no friction.")
 
 
+@pytest.mark.parametrize("trial", [None, Trial((), 12)])
+def test_photographs_that_show_everything_but_no_equilibrium_are_no_lack_of_photographs(monkeypatch, trial):
+    for name in ("Inputs", "material_of", "settings_of", "measure_data_quality"):
+        monkeypatch.setattr(prediction, name, lambda *_: GOOD)
+    monkeypatch.setattr(prediction, "solve_trial", lambda *_, **__: trial)
+    monkeypatch.setattr(prediction, "diagnose", lambda *_: ())
+    assert prediction.predict_accuracy("config", "tracks", "walls").verdict() == prediction.NO_FORCES
+    monkeypatch.setattr(prediction, "measure_data_quality", lambda *_: None)
+    assert "two consecutive photographs" in prediction.predict_accuracy("config", "tracks", "walls").verdict()
+
+
 @pytest.mark.parametrize(("evidence", "compared"), [(SOUND, False), (WRONG, True)])
 def test_rival_inputs_are_compared_where_the_first_twelve_photographs_leave_them_open(monkeypatch, evidence, compared):
     solved, diagnosed = [], []

@@ -45,12 +45,29 @@ def causes(trial=WRONG):
     return [each.cause for each in diagnose(INPUTS, Trial((trial,), 1))]
 
 
-def test_the_clear_winner_is_named_with_effect_and_cure(scores):
+def test_the_clear_winner_is_named_with_effect_and_cure(scores, monkeypatch):
     scores["all_radii"] = 0.8
+    monkeypatch.setattr(module, "_mean_gap", lambda inputs: 0.02)
     (found,) = diagnose(INPUTS, Trial((WRONG,), 1))
     assert found.cause == "all_radii"
     assert found.effect == CAUSES["all_radii"].effect
     assert "Cure: measure the radii anew" in found.sentence()
+
+
+@pytest.mark.parametrize("gap", [0.005, 0.0, -0.005])
+def test_wrong_radii_that_the_gaps_of_hard_rods_exclude_are_not_named(scores, monkeypatch, gap):
+    scores["all_radii"] = 0.8
+    monkeypatch.setattr(module, "_mean_gap", lambda inputs: gap)
+    assert causes() == ["not_explained"]
+    assert causes(replace(WRONG, information=replace(WRONG.information, soft=True))) == ["all_radii"]
+    monkeypatch.setattr(module, "_mean_gap", lambda inputs: np.nan)
+    assert causes() == ["all_radii"]
+
+
+def test_the_mean_gap_of_touching_rods_is_over_a_diameter():
+    inputs = replace(INPUTS, tracks=replace(INPUTS.tracks, radius=0.99 * INPUTS.tracks.radius))
+    change = module._mean_gap(inputs) - module._mean_gap(INPUTS)
+    assert change == pytest.approx(0.01, rel=0.2)
 
 
 def test_a_stretching_that_the_gaps_of_rods_exclude_is_not_named(scores):
@@ -136,7 +153,7 @@ def test_rivals_are_compared_where_photographs_after_the_first_are_doubtful(
     monkeypatch.setattr(module, "solve_trial", lambda *_, first: begun.append(first))
     monkeypatch.setattr(module, "diagnose", lambda *_, **__: [])
     frames = [SimpleNamespace(expected_correlation=each) for each in expected]
-    results = SimpleNamespace(friction_check=None, frames=frames)
+    results = SimpleNamespace(friction_check=None, frames=frames, wall_force_ratio=lambda: np.empty(0))
     module.diagnose_solved(None, results)  # type: ignore[arg-type]
     assert begun == ([] if compared is None else [compared])
 

@@ -119,6 +119,28 @@ def test_swapped_and_repeated_photographs_are_named():
     assert "photograph 4" in repeated.evidence
 
 
+def test_rests_and_uneven_steps_are_no_repetition_and_copies_are():
+    tracks, rng = rolling_tracks(), np.random.default_rng(3)
+
+    def shown(order, noise):
+        position = tracks.position[order]
+        return replace(tracks, position=position + noise * rng.standard_normal(position.shape))
+
+    assert examine_order(shown([0, 1, 2, 2, 2, 3, 4, 5], NOISE)) == []  # a rest of three photographs
+    assert examine_order(shown([0, 1, 2, 5, 5, 6, 7, 7], NOISE)) == []  # two of them, and a large step
+    assert examine_order(shown([0, 1, 1, 2, 3, 4, 5, 7], NOISE)) == []
+    (repeated,) = examine_order(shown([0, 1, 1, 2, 2, 3, 4, 5], 0.02 * NOISE))
+    assert repeated.cause == "photograph_repeated"
+    assert repeated.evidence.endswith("photograph 2, 4")
+
+
+def test_a_few_outliers_of_a_packing_at_rest_are_no_other_order():
+    tracks, rng = rolling_tracks(), np.random.default_rng(4)
+    position = tracks.position[:1] + NOISE * rng.standard_normal(tracks.position.shape)
+    position[[1, 3, 5], [8, 3, 7]] += 100.0 * NOISE
+    assert examine_order(replace(tracks, position=position)) == []
+
+
 def test_a_return_of_the_loading_is_no_swap():
     tracks = rolling_tracks()
     assert examine_order(replace(tracks, position=tracks.position[[0, 1, 2, 3, 2, 1, 0, 1]])) == []
