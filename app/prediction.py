@@ -49,8 +49,8 @@ NOT_PREDICTED = (
     "photographs."
 )
 NO_FORCES = (
-    "Something is wrong: no forces of the first photographs are in equilibrium. Check radii, walls and loads, and whether "
-    "rods are missing."
+    "Something is wrong: no forces of the first photographs are in equilibrium. Check radii, walls and loads, and "
+    "whether rods are missing."
 )
 
 

@@ -20,7 +20,7 @@ from ..solver.assessment.intervals.force_intervals import widen_scale
 from ..solver.assessment.intervals.scale_sd import FIRST_BY_SECOND
 from ..solver.assessment.intervals.statistic_intervals import widen_for_friction
 from ..solver.assessment.intervals.wall_sensors import scale_error
-from ..solver.assessment.penalties import limit_for_few_photographs, penalise_friction
+from ..solver.assessment.penalties import limit_by_intervals, limit_for_few_photographs, penalise_friction
 from ..solver.convex.friction_check import FrictionCheck
 from ..solver.frame_forces import FrameForces, FrameStatus
 from ..solver.kinematics.sequence_kinematics import SequenceKinematics, measure_kinematics
@@ -90,7 +90,8 @@ def infer_sequence(
     ratio = replace(unsolved, frames=frames, statistics=statistics).wall_force_ratio()
 
     def assess(k: int) -> FrameForces:
-        frame = limit_for_few_photographs(penalise_friction(frames[k], check, measured=measured), count)
+        frame = limit_by_intervals(penalise_friction(frames[k], check, measured=measured))
+        frame = limit_for_few_photographs(frame, count)
         contradicted = scale_error(ratio, frame.scale_sd)
         frame = widen_scale(frame, contradicted) if contradicted else frame
         return limit_for_smoothing(frame) if smoothed else frame

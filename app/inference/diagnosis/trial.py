@@ -14,7 +14,7 @@ from ...process.errors import UndeterminedError
 from ...process.machine.linear_algebra import one_thread_each
 from ...solver.assessment.evidence import Evidence
 from ...solver.assessment.expected_correlation import correlation_score, expect_correlation, predict_correlation
-from ...solver.assessment.penalties import assess, find_penalties
+from ...solver.assessment.penalties import assess, find_penalties, most_by_intervals
 from ..correction.close_photographs import choose_span
 from ..correction.correct_sequence import correct_sequence
 from ..frame_store import MemoryStore
@@ -33,6 +33,7 @@ class Trial:
     evidence: tuple[Evidence, ...]  # of the judged frames
     stride: int  # between the photographs that were solved
     photographs: int = PREDICTED_PHOTOGRAPHS  # that were at hand
+    most: float = 1.0  # mean limit of the trust by the error bars of the judged frames
 
     @property
     def expected(self) -> tuple[float, float, float]:
@@ -46,7 +47,7 @@ class Trial:
             return math.nan, math.nan, math.nan
         kept = float(np.mean([_kept(each) for each in found]))
         r, low, high = (kept * each for each in predict_correlation(found, contradicted=contradicted))
-        return r, low, high
+        return min(r, self.most), min(low, self.most), high
 
     @property
     def score(self) -> float:
@@ -94,8 +95,11 @@ def solve_trial(
     store = MemoryStore()
     solve_frames(correct_sequence(given), store, InferenceObserver() if observer is None else observer)
     judged = store.frames[min(SETTLED, len(store.frames) - 1) :]
-    evidence = tuple(each.state.evidence for each in judged if each.state.evidence.assessed)
-    return Trial(evidence, stride, inputs.tracks.frame_count) if evidence else None
+    judged = [each for each in judged if each.state.evidence.assessed]
+    if not judged:
+        return None
+    most = float(np.mean([most_by_intervals(each.forces) for each in judged]))
+    return Trial(tuple(each.state.evidence for each in judged), stride, inputs.tracks.frame_count, most)
 
 
 def select_window(inputs: Inputs, photographs: int = TRIAL_PHOTOGRAPHS, first: int = 0) -> tuple[Inputs, int]:

@@ -204,6 +204,19 @@ def formula_sd_of(frame: FrameForces) -> Array:
     return TYPICAL * (sd / interval_factors(frame)) ** (1.0 / (1.0 + POWER[source_of_frame(frame)]))
 
 
+def correlation_by_intervals(frame: FrameForces) -> float:
+    """Compute the correlation of f_n with the true forces that the standard deviations of f_n lead to expect.
+
+    Notes
+    -----
+    1/√(1 + Σ s²/Σ (f_n − ⟨f_n⟩)²) for estimates that are the mean of a posterior with standard deviations s, without
+    their part by the scale, which changes no correlation. NaN where all forces are alike, or without any.
+    """
+    variance = float(np.sum((frame.fn - frame.fn.mean()) ** 2)) if len(frame.fn) else 0.0
+    left = np.maximum(frame.fn_sd**2 - _scale_errors(frame)[:, 0] ** 2, 0.0)
+    return 1.0 / math.sqrt(1.0 + float(left.sum()) / variance) if variance > 0.0 else math.nan
+
+
 def interval_factors(frame: FrameForces) -> Array:
     """Factors on the standard deviations of f_n and f_t (c, 2) by group, source and terms of the frame."""
     source = source_of_frame(frame)

@@ -14,7 +14,9 @@ from rodsight.solver.assessment.penalties import (
     assess,
     describe_penalties,
     find_penalties,
+    limit_by_intervals,
     limit_for_few_photographs,
+    most_by_intervals,
     penalise_friction,
 )
 from rodsight.solver.assessment.trust import motion_assessment
@@ -163,3 +165,18 @@ def test_two_photographs_alone_are_not_trusted():
     assert limit_for_few_photographs(frame, 3) is frame
     low = replace(frame, trust=0.1)
     assert limit_for_few_photographs(low, 2) is low
+
+
+@pytest.mark.parametrize(("by_intervals", "most"), [(0.95, 1.0), (0.7, 0.85), (0.6, 0.75), (0.5, 0.45), (0.2, 0.0)])
+def test_nothing_is_trusted_beyond_the_error_bars(by_intervals, most):
+    frame = replace(make_results(1, 8, 7, sweeps=2).frames[0], trust=0.9, expected_correlation=0.97, soft=0)
+    fn = np.linspace(1.0, 3.0, len(frame.fn))
+    sd = np.std(fn) * np.sqrt(by_intervals**-2 - 1.0)
+    wide = replace(frame, fn=fn, fn_sd=np.full_like(fn, sd), scale_sd=np.nan)
+    assert most_by_intervals(wide) == pytest.approx(most)
+    limited = limit_by_intervals(wide)
+    assert limited.trust == pytest.approx(min(0.9, most))
+    assert limited.trust_penalties.startswith("the error bars") == (most < 0.9)
+    assert limited.expected_correlation == pytest.approx(min(0.97, most) if most < 0.9 else 0.97)
+    assert limit_by_intervals(replace(wide, soft=1)).trust == 0.9
+    assert limit_by_intervals(replace(wide, fn=np.ones_like(fn))).trust == 0.9

@@ -31,7 +31,11 @@ def solve_into(monkeypatch, evidence: list[Evidence]) -> list[Inputs]:
     monkeypatch.setattr(module, "correct_sequence", solved.append)
 
     def solve_frames(_, store, observer) -> None:
-        store.frames.extend(SimpleNamespace(state=SimpleNamespace(evidence=each)) for each in evidence)
+        store.frames.extend(
+            SimpleNamespace(state=SimpleNamespace(evidence=each), forces=0.5 + each.correction) for each in evidence
+        )
+
+    monkeypatch.setattr(module, "most_by_intervals", lambda forces: forces)
 
     monkeypatch.setattr(module, "solve_frames", solve_frames)
     return solved
@@ -44,6 +48,8 @@ def test_frames_without_a_history_or_an_assessment_are_not_judged(inputs, monkey
     found = solve_trial(inputs)
     assert found is not None
     assert found.evidence == (evidence[2], evidence[4])
+    assert found.most == pytest.approx(0.8)
+    assert found.expect(contradicted=False)[:2] == pytest.approx([0.8, min(0.8, replace(found, most=1.0).expected[1])])
     solve_into(monkeypatch, evidence[:1])
     alone = solve_trial(inputs)
     assert alone is not None

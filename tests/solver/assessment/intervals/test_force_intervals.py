@@ -15,6 +15,7 @@ from rodsight.solver.assessment.intervals.force_intervals import (
     Group,
     Term,
     calibrate_sd,
+    correlation_by_intervals,
     evidence_source_of,
     formula_sd_of,
     groups_of,
@@ -214,3 +215,16 @@ def test_a_fraction_of_the_step_between_two_frictions_widens_by_that_fraction(fr
     whole, half = (widen_for_friction(frame, 0.2, 0.26, fraction) for fraction in (1.0, 0.5))
     added = [np.sqrt(each.fn_sd[1:] ** 2 - frame.fn_sd[1:] ** 2) for each in (whole, half)]
     assert added[1] == pytest.approx(0.5 * added[0], rel=1e-5)
+
+
+def test_the_intervals_state_the_correlation_of_a_posterior_mean(frame):
+    """Truths are drawn around the forces; what all share, and a single value, correlate with nothing."""
+    rng = np.random.default_rng(4)
+    sd = np.full_like(frame.fn, 10.0)
+    certain = replace(frame, fn_sd=sd, soft=0, scale_sd=np.nan)
+    truths = frame.fn + sd * rng.standard_normal((2000, len(sd)))
+    found = np.mean([np.corrcoef(frame.fn, each)[0, 1] for each in truths])
+    assert correlation_by_intervals(certain) == pytest.approx(found, abs=0.01)
+    of_scale = replace(frame, fn_sd=np.hypot(sd, 0.3 * frame.fn), soft=0, scale_sd=0.3)
+    assert correlation_by_intervals(of_scale) == pytest.approx(correlation_by_intervals(certain))
+    assert np.isnan(correlation_by_intervals(replace(certain, fn=np.full_like(sd, 5.0))))
