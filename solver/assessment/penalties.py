@@ -125,7 +125,7 @@ def most_by_intervals(frame: FrameForces) -> float:
     Notes
     -----
     R + .15 with R of `correlation_by_intervals`, below R = .6 less by twice the difference. Of 102 kinds of simulated
-    tests (120 rods, seed 7) it limits 1 % of the frames of hard grains, and R is below .6 in one frame, of wrong input.
+    tests (120 rods, seed 7) it limits 2 % of the frames of hard grains, and R is below .6 where input is wrong alone.
     """
     expected = 1.0 if frame.soft else correlation_by_intervals(frame)
     if math.isnan(expected):
