@@ -18,6 +18,8 @@ FAR = (
     0.5  # of the distance to the nearest grain: a grain that departs more from its expected place may have another name
 )
 NEAR = 0.25  # of that distance: a grain that stands nearer to the expected place of another may be that other
+# Of the least distance of two grains: motions that differ by less cannot bring one half of its distance astray.
+QUIET = 0.15
 
 
 def find_exchanged_ids(position: Float[Array, "f n 2"]) -> Int[np.ndarray, "f n"]:
@@ -45,16 +47,35 @@ def find_exchanged_ids(position: Float[Array, "f n 2"]) -> Int[np.ndarray, "f n"
     row = np.tile(np.arange(n), (frames, 1))
     if n <= NEIGHBOURS or frames < 2:
         return row
-    last = position[0].copy()
+    last, quiet = position[0].copy(), QUIET * _least_distance(position[0])
     for k in range(1, frames):
         row[k] = row[k - 1]
-        moved = _continued(last, position[k][row[k]])
+        now = position[k][row[k]]
+        if _moves_as_one(last, now, quiet):
+            last = now
+            continue
+        moved = _continued(last, now)
         if moved is None:
             continue
         _restore(row[k], moved, position[k])
         now = position[k][row[k]]
         last = np.where(np.isfinite(now), now, moved)
     return row
+
+
+def _least_distance(place: Array) -> float:
+    """Least distance [m] between two of the grains at some places (n, 2) [m]; 0 with fewer than two."""
+    known = place[np.isfinite(place[:, 0])]
+    return float(KDTree(known).query(known, k=2)[0][:, 1].min()) if len(known) > 1 else 0.0
+
+
+def _moves_as_one(last: Array, now: Array, most: float) -> bool:
+    """Whether all grains are seen again, and none moves by `most` [m] otherwise than the median: none is astray."""
+    known = np.isfinite(last[:, 0])
+    if not known.any():
+        return False
+    step = now[known] - last[known]
+    return bool(np.abs(step - np.median(step, axis=0)).max() < most)  # not where one has no pose now
 
 
 def _continued(last: Array, now: Array) -> Array | None:

@@ -27,6 +27,7 @@ MUTANTS = [
         ("row[one] = former[other]", "row[one] = other"),
         ("row[np.setdiff1d(other, one)] = former[np.setdiff1d(one, other)]", "pass"),
         ("row[k] = row[k - 1]", "pass"),
+        ("np.abs(step - np.median(step, axis=0)).max() < most", "np.abs(step - np.median(step, axis=0)).max() < 9.0"),
     ),
     *mutants_of(
         "app/inference/correction/outliers.py",
