@@ -64,7 +64,7 @@ CAUSES: dict[str, Cause] = {
         "look at these rods in these photographs",
     ),
     "exchanged_ids": Cause(
-        "these rods seem to jump to each other's places, with each other's radii",
+        "a rod seems to jump to another's place, with its radius, or to be lost",
         "a run gives every rod the name under which it was seen first: correct the table of the tracks",
     ),
     "missing_poses": Cause(
