@@ -32,6 +32,8 @@ SEED = 0  # of the draws: the same input gives the same bits
 # soft packings of three sizes, .02 where one of three radii is 2 % too large.
 UNEQUAL = 0.25
 SEEN = 0.002  # mean overlap over a diameter, below which it does not matter
+DEEP = 0.15  # overlap over the smaller radius beyond which a radius is wrong, whatever the stiffness
+READ, MOST = 6, 0.3  # photographs that are read; fraction of the rods beyond which all lengths are wrong
 FEWEST = 30  # overlaps of a size in all photographs, with which it counts
 
 
@@ -175,3 +177,35 @@ def find_wrong_sizes(tracks: Tracks, walls: WallTracks | None, failed: Collectio
     radius = [float(tracks.radius[sizes == each].mean()) for each in known.tolist()]
     overlap = {r: d / (2.0 * r) for r, d in zip(radius, mean.tolist(), strict=True)}
     return {r: each for r, each in overlap.items() if each > SEEN and mean.min() < UNEQUAL * 2.0 * r * each}
+
+
+def find_oversized_rods(tracks: Tracks) -> dict[int, float]:
+    """Find rods that lie inside their neighbours, as where a row of the table of radii is that of another rod.
+
+    Returns
+    -------
+    dict of int to float
+        Row of every such rod, and its greatest overlap over the smaller radius; empty where they are more than MOST.
+
+    Notes
+    -----
+    Pairs count whose overlap is more than DEEP of the smaller radius in more than half of the photographs that are read
+    and show both; no rod is so soft. Of their rods that with the most such pairs is wrong, then of the rest.
+    """
+    grains = RodMaterial().pack(tracks.radius, np.empty(0)).grains
+    read = np.unique(np.linspace(0, tracks.frame_count - 1, min(tracks.frame_count, READ)).round().astype(int)).tolist()
+    deep: dict[tuple[int, int], list[float]] = {}
+    for k in read:
+        near = detect_contacts(grains, tracks.position[k], tracks.present_in(k), walls_in(None, k), 0.0)
+        depth = -near.gap / np.minimum(tracks.radius[near.i], tracks.radius[near.j])
+        for row in np.flatnonzero(depth > DEEP).tolist():
+            deep.setdefault((int(near.i[row]), int(near.j[row])), []).append(float(depth[row]))
+    seen = tracks.present[read]
+    pairs = {pair: max(each) for pair, each in deep.items() if len(each) > 0.5 * seen[:, pair].all(axis=1).sum()}
+    found: dict[int, float] = {}
+    while pairs:
+        count = np.bincount(np.array(list(pairs)).ravel(), minlength=tracks.grain_count)
+        worst = int(np.lexsort([tracks.radius, count])[-1])  # of as many pairs the larger rod
+        found[worst] = max(depth for pair, depth in pairs.items() if worst in pair)
+        pairs = {pair: depth for pair, depth in pairs.items() if worst not in pair}
+    return found if len(found) <= MOST * tracks.grain_count else {}

@@ -95,6 +95,10 @@ CAUSES: dict[str, Cause] = {
     ),
     "all_radii": Cause("contacts are lost or invented", "measure the radii anew, or the pixel size"),
     "class_radii": Cause("contacts of one size of rods are lost or invented", "measure the radii of every size anew"),
+    "oversized_rods": Cause(
+        "forces on these rods and around them are far too large",
+        "measure their radii anew; other rods may be stated too small, which no overlap shows",
+    ),
     "exchanged_sizes": Cause(
         "these rods penetrate their neighbours or touch none",
         "a run uses the sizes with which they touch: correct their radii in the table",

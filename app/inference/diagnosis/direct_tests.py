@@ -18,7 +18,7 @@ from ...solver.inferred.unknown_rotations import fill_unknown_rotations
 from ...solver.statistics.agreement import pearson, ranks
 from ...tracks import Tracks, WallTracks
 from ..correction.outliers import find_outliers, walls_in
-from ..correction.radii import find_wrong_sizes
+from ..correction.radii import NAMED, find_oversized_rods, find_wrong_sizes
 from .causes import finding
 from .wall_times import rods_beside
 
@@ -241,7 +241,11 @@ def examine_poses(tracks: Tracks, impossible: NDArray[np.bool_]) -> list[Finding
 
 
 def examine_sizes(tracks: Tracks, walls: WallTracks | None = None) -> list[Finding]:
-    """Look for sizes of rods whose radius is stated too large."""
+    """Look for rods, and for sizes of rods, whose radius is stated too large."""
+    if rods := find_oversized_rods(tracks):
+        listed = ", ".join(str(tracks.id[row]) for row in list(rods)[:NAMED]) + ("…" if len(rods) > NAMED else "")
+        deepest = f"by up to {100.0 * max(rods.values()):.0f} % of the smaller radius"
+        return [finding("oversized_rods", f"rods overlap their neighbours {deepest}, because of {listed}")]
     found = find_wrong_sizes(tracks, walls)
     if not found:
         return []

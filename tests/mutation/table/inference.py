@@ -16,6 +16,16 @@ MUTANTS = [
         ("radius=found.shared_radius(tracks.radius)", "radius=-found.shared_radius(tracks.radius)"),
     ),
     *mutants_of(
+        "app/inference/correction/radii.py",
+        f"{TESTS}/diagnosis/test_direct_tests.py",
+        ("len(each) > 0.5 * seen[:, pair].all(axis=1).sum()", "len(each)"),
+        ("seen[:, pair].all(axis=1).sum()", "len(read)"),
+        ("if worst not in pair}", "if False}"),
+        ("np.lexsort([tracks.radius, count])[-1]", "np.lexsort([-tracks.radius, count])[0]"),
+        ("if len(found) <= MOST * tracks.grain_count else {}", ""),
+        ("np.flatnonzero(depth > DEEP)", "np.flatnonzero(depth > 0.01)"),
+    ),
+    *mutants_of(
         "solver/inferred/exchanged_ids.py",
         "tests/solver/inferred/test_exchanged_ids.py",
         ("expected[placed] += np.median(now[near] - last[near], axis=1)", "expected[placed] += 0.0"),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rodsight.inference.correction.outliers import find_outliers
-from rodsight.inference.correction.radii import find_wrong_sizes
+from rodsight.inference.correction.radii import find_oversized_rods, find_wrong_sizes
 from rodsight.inference.diagnosis.direct_tests import (
     SPAN_SIGMAS,
     _deformation,
@@ -264,6 +264,42 @@ def test_small_overlaps_and_photographs_that_failed_show_no_wrong_size(monkeypat
     squeezed[3, in_odd_layer, 0] *= 0.9
     tracks = replace(tracks, position=squeezed)
     assert find_wrong_sizes(tracks, box(), failed=[3]) == {}
+
+
+def with_factors(tracks, factors):
+    radius = tracks.radius.copy()
+    radius[list(factors)] *= list(factors.values())
+    return replace(tracks, radius=radius)
+
+
+def test_rods_that_lie_inside_their_neighbours_are_named_and_these_are_not():
+    tracks = with_factors(rolling_tracks(), {44: 1.5, 45: 1.4, 12: 1.3})
+    found = find_oversized_rods(tracks)
+    assert set(found) == {44, 45, 12}
+    assert found[12] == pytest.approx(0.3, abs=0.06)
+    (named,) = examine_sizes(tracks, box())
+    assert named.cause == "oversized_rods"
+    assert set(named.evidence.split("because of ")[1].split(", ")) == {"44", "45", "12"}
+
+
+@pytest.mark.parametrize("factors", [{44: 1.1}, {44: 0.5}, dict.fromkeys(range(0, N, 3), 1.5)])
+def test_small_overlaps_small_radii_and_radii_that_are_wrong_everywhere_show_no_single_rod(factors):
+    assert find_oversized_rods(with_factors(rolling_tracks(), factors)) == {}
+
+
+@pytest.mark.parametrize(("photographs", "named"), [((3,), False), ((0, 1, 2, 3), False), ((0, 1, 3, 4, 6, 7), True)])
+def test_a_rod_that_overlaps_others_in_few_photographs_is_no_wrong_radius(photographs, named):
+    tracks = rolling_tracks()
+    position = tracks.position.copy()
+    position[list(photographs), 44, 0] += 0.4 * RADIUS
+    assert bool(find_oversized_rods(replace(tracks, position=position))) == named
+
+
+def test_photographs_without_the_rod_do_not_count():
+    tracks = with_factors(rolling_tracks(), {44: 1.5})
+    position, status = tracks.position.copy(), tracks.status.copy()
+    position[2:, 44], status[2:, 44] = np.nan, TrackStatus.LOST
+    assert set(find_oversized_rods(replace(tracks, position=position, status=status))) == {44}
 
 
 def test_fast_shear_is_named():
