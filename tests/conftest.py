@@ -53,6 +53,15 @@ def made_tracks(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
+def without_sensors(made_tracks: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same without recorded forces on walls, which a call with arrays does not have; not to be written to."""
+    folder = Path(shutil.copytree(made_tracks, tmp_path_factory.mktemp("tracked") / "without_sensors"))
+    config = folder / "experiment.toml"
+    config.write_text(config.read_text().replace('forces = "wall_forces.csv"\n', ""))
+    return folder
+
+
+@pytest.fixture(scope="session")
 def examples(made_tracks: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where the examples of docstrings and pages work: an experiment my_test and its run, runs/shear."""
     folder = tmp_path_factory.mktemp("examples")

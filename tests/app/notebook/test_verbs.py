@@ -71,7 +71,8 @@ def test_check_gives_what_the_command_prints(made_tracks, capsys):
 
 
 @pytest.mark.thorough
-def test_tracks_solve_to_the_same_forces(made_tracks, run, tmp_path):
+def test_tracks_solve_to_the_same_forces(made_tracks, without_sensors, tmp_path):
+    run = rodsight.run(without_sensors, out=tmp_path / "without_sensors", settings=FEW)
     tracks = rodsight.track(made_tracks, out=tmp_path / "run")
     walls = pd.read_csv(made_tracks / "walls.csv")  # those of the run are corrected
     solved = rodsight.solve(tracks, walls, pressure={"top": 50e3}, settings=FEW)
