@@ -37,6 +37,7 @@ def scores(monkeypatch):
             yield replace(each, change=lambda _, changed=changed: changed)
 
     monkeypatch.setattr(module, "rivals_of", rivals)
+    monkeypatch.setattr(module, "_mean_gap", lambda inputs: np.nan)  # gaps exclude none
     monkeypatch.setattr(module, "trial_score", lambda inputs, _: given + rises.get(by_input[id(inputs)][1], 0.0))
     return rises
 
