@@ -65,6 +65,8 @@ def restore_exchanged_ids(tracks: Tracks) -> tuple[Tracks, str]:
         Which rods have the names of which others, and from which photograph on; empty where none has.
     """
     row = find_exchanged_ids(np.where(tracks.present[..., None], tracks.position, np.nan))
+    if (row == row[:1]).all():  # nothing to copy
+        return tracks, ""
     restored, events = tracks.rearranged(row), []
     for k in range(1, tracks.frame_count):
         changed = (row[k] != row[k - 1]) & restored.present_in(k)
