@@ -24,7 +24,8 @@ from .wall_times import rods_beside
 
 AGREES = 0.15  # rank correlation of stated and inferred rotations beyond which they are the same, or opposite …
 SIGMAS = 5.0  # … and standard deviations of that of unrelated ones
-DEGREES = 10.0  # ratio of stated to inferred rotations: degrees are 57 times radians
+DEGREES = 10.0  # ratio of stated to inferred rotations: degrees are 57 times radians …
+DEGREES_OF_NOISE = 30.0  # … where noise hides the sense of the rotations: half of that
 TURNS, FEWEST_TURNING = 0.3, 20  # least slope of the mean rotation over the packing's that counts; rods of a step
 SPAN_SIGMAS = 15.0  # standard deviations of a position by which rods must move among each other between two photographs
 SHORTER = 0.75  # path through the photographs in another order over the given one, below which that order is right
@@ -35,7 +36,8 @@ STILL = 1.5  # … or over that of noise alone
 MOVES = 4.0  # noise that the median step must exceed for that
 EVEN = 0.25  # standard deviation of all other steps over their mean up to which one rest is a photograph taken twice
 SAME = 0.1  # displacement over that of noise, below which both are one photograph
-OUTLYING = 0.95  # quantile of the displacements above which a rod may be an outlier
+OUTLYING = 0.95  # quantile of the displacements above which a rod may be an outlier …
+OUTLYING_IN_TWO = 0.75  # … where the order is judged: each of two photographs has its own
 DRIFT_SIGMAS = 15.0  # standard deviations of a position by which rods may leave or penetrate a wall …
 DRIFT = 0.02  # … and fraction of the mean radius
 TOGETHER = 0.2  # of the greatest change of a gap at a wall: what a common translation of all rods may leave
@@ -75,15 +77,16 @@ def examine_rotations(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     stated, known = stated[chosen], known[chosen] & np.isfinite(inferred)
     stated, inferred = stated[known], inferred[known]
     rank = pearson(ranks(stated), ranks(inferred)) if len(stated) > 1 and inferred.any() else 0.0
+    rolling = float(np.median(np.abs(inferred))) if len(stated) else 0.0
+    ratio = float(np.median(np.abs(stated))) / rolling if rolling > 0.0 else 0.0
+    excess = f"rods rotate {ratio:.0f} times as much as rolling leads to expect"
     if abs(rank) >= max(AGREES, SIGMAS / np.sqrt(max(len(stated), 1))):
         against = f"the rank correlation with the rotations expected from rolling is {rank:.2f}"
-        ratio = float(np.median(np.abs(stated)) / max(float(np.median(np.abs(inferred))), 1e-300))
-        return _judge_rotations(
-            rank, against, ratio, f"rods rotate {ratio:.0f} times as much as rolling leads to expect"
-        )
+        return _judge_rotations(rank, against, ratio, excess)
     slope, error = _slope_of_turning(tracks)
     if abs(slope) < max(TURNS, SIGMAS * error):
-        return []
+        unrelated = f"{excess}, without relation to it"
+        return [finding("rotation_in_degrees", unrelated)] if ratio > DEGREES_OF_NOISE else []
     words = f"rods rotate on average by {slope:.1f} times the rotation of the packing"
     return _judge_rotations(slope, words, slope, words)
 
@@ -152,16 +155,19 @@ def examine_order(tracks: Tracks) -> list[Finding]:
     f = tracks.frame_count
     if f < 4:
         return []
-    step = np.array([_distance(tracks, k, k + 1) for k in range(f - 1)])
+    step, usual_step = (
+        np.array([_distance(tracks, k, k + 1, quantile) for k in range(f - 1)])
+        for quantile in (OUTLYING, OUTLYING_IN_TWO)
+    )
     if not np.isfinite(step).any():
         return []
     usual, noise = float(np.nanmedian(step)), float(np.sqrt(2.0) * np.nanmedian(tracks.position_sigma))
     found = []
-    swapped = [k for k in range(1, f - 2) if _shorter_if_swapped(tracks, step, k)]
+    swapped = [k for k in range(1, f - 2) if _shorter_if_swapped(tracks, usual_step, k)]
     if swapped:
         pairs = ", ".join(f"{k} and {k + 1}" for k in swapped[:4]) + ("…" if len(swapped) > 4 else "")
         found.append(finding("photographs_swapped", f"the motion is shorter with photographs {pairs} swapped"))
-    elif shorter := _shortened_by_sorting(tracks, step):
+    elif shorter := _shortened_by_sorting(tracks, usual_step):
         words = f"in another order the motion is {100.0 * shorter:.0f} % shorter, and its steps are more even"
         found.append(finding("photographs_swapped", words))
     repeated = np.flatnonzero(_nothing_moves(step, noise)) if usual > MOVES * noise else np.empty(0, np.int64)
@@ -325,13 +331,13 @@ def _gradient(tracks: Tracks, k: int, both: NDArray[np.bool_]) -> Array:
     return displacement_gradient(tracks.position[k - 1], moved, both)
 
 
-def _distance(tracks: Tracks, k: int, other: int) -> float:
-    """Rms displacement of all rods but outliers from one photograph to another [m]; NaN where few are in both."""
+def _distance(tracks: Tracks, k: int, other: int, quantile: float = OUTLYING_IN_TWO) -> float:
+    """Rms of the displacements [m] up to a quantile from one photograph to another; NaN where few rods are in both."""
     both = tracks.present_in(k) & tracks.present_in(other)
     square = np.mean((tracks.position[other, both] - tracks.position[k, both]) ** 2, axis=1)
     if not both.mean() > IN_BOTH:
         return np.nan
-    return float(np.sqrt(np.mean(square[square <= np.quantile(square, OUTLYING)])))
+    return float(np.sqrt(np.mean(square[square <= np.quantile(square, quantile)])))
 
 
 def _shorter_if_swapped(tracks: Tracks, step: Array, k: int) -> bool:

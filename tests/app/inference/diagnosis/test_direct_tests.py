@@ -98,7 +98,11 @@ def test_unknown_and_unrelated_rotations_give_no_finding():
     tracks = rolling_tracks()
     assert examine_rotations(replace(tracks, rotation=np.full((FRAMES, N), np.nan)), box()) == []
     random = np.random.default_rng(5).normal(size=(FRAMES, N))
-    assert examine_rotations(replace(tracks, rotation=random), box()) == []
+    usual = float(np.median(np.abs(np.diff(with_rolling(1.0).rotation, axis=0))))
+    assert examine_rotations(replace(tracks, rotation=10.0 * usual * random), box()) == []
+    (found,) = examine_rotations(replace(tracks, rotation=1e3 * usual * random), box())
+    assert found.cause == "rotation_in_degrees"
+    assert found.evidence.endswith("without relation to it")
 
 
 def test_photographs_in_order_give_no_finding():
@@ -138,6 +142,15 @@ def test_a_few_outliers_of_a_packing_at_rest_are_no_other_order():
     tracks, rng = rolling_tracks(), np.random.default_rng(4)
     position = tracks.position[:1] + NOISE * rng.standard_normal(tracks.position.shape)
     position[[1, 3, 5], [8, 3, 7]] += 100.0 * NOISE
+    assert examine_order(replace(tracks, position=position)) == []
+
+
+def test_a_fraction_of_outliers_in_every_photograph_is_no_other_order():
+    tracks, rng = rolling_tracks(), np.random.default_rng(0)
+    position = tracks.position[:1] + NOISE * rng.standard_normal(tracks.position.shape)
+    for photograph in position[1:]:
+        jump = np.exp(rng.uniform(2.0, 8.0, (N // 14, 1))) * NOISE * rng.standard_normal((N // 14, 2))
+        photograph[rng.choice(N, N // 14, replace=False)] += jump
     assert examine_order(replace(tracks, position=position)) == []
 
 
