@@ -27,6 +27,7 @@ def _sample(seed: int) -> tuple[MixtureSample, np.ndarray]:
     return MixtureSample(np.where(rng.random(COUNT) < 0.5, "shear", "biaxial"), terms, r, r[:, -1]), best
 
 
+@pytest.mark.slow
 def test_the_fitted_weight_is_the_best_one_on_frames_that_were_not_fitted() -> None:
     coefficients = fit_weight(_sample(1)[0])
     other, best = _sample(2)
@@ -35,6 +36,7 @@ def test_the_fitted_weight_is_the_best_one_on_frames_that_were_not_fitted() -> N
     assert (other.r.max(axis=1) - other.reached(np.full(COUNT, best.mean()))).mean() > 0.01
 
 
+@pytest.mark.slow
 def test_a_fit_takes_little_from_a_kind_that_the_present_weights_serve_best() -> None:
     rng, table = np.random.default_rng(3), FITTED["position_weight"]
     present = np.array([table[name] for name in WEIGHT_TERMS])

@@ -107,6 +107,7 @@ def _draw_coarse() -> tuple[np.ndarray, np.ndarray]:
     return image.astype(np.float32), np.delete(centre, COARSE_HOLES, axis=0)
 
 
+@pytest.mark.slow
 def test_rods_with_coarse_paint_are_found_at_full_resolution_and_holes_are_not() -> None:
     image, centre = _draw_coarse()
     settings = DetectionSettings(radii=(COARSE_RADIUS,))

@@ -55,7 +55,7 @@ def test_the_clear_winner_is_named_with_effect_and_cure(scores, monkeypatch):
     assert "Cure: measure the radii anew" in found.sentence()
 
 
-@pytest.mark.parametrize("gap", [0.005, 0.0, -0.005])
+@pytest.mark.parametrize("gap", [0.005, *(pytest.param(each, marks=pytest.mark.slow) for each in (0.0, -0.005))])
 def test_wrong_radii_that_the_gaps_of_hard_rods_exclude_are_not_named(scores, monkeypatch, gap):
     scores["all_radii"] = 0.8
     monkeypatch.setattr(module, "_mean_gap", lambda inputs: gap)
@@ -86,7 +86,10 @@ def test_a_stretching_that_the_gaps_of_rods_exclude_is_not_named(scores):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("rises", [{"all_radii": 0.15}, {"all_radii": 0.5, "stretched_picture": 0.45}, {}])
+@pytest.mark.parametrize("rises", [
+    {"all_radii": 0.5, "stretched_picture": 0.45},
+    *(pytest.param(each, marks=pytest.mark.slow) for each in ({"all_radii": 0.15}, {})),
+])  # fmt: skip
 def test_without_a_clear_winner_nothing_is_blamed(scores, rises):
     scores.update(rises)
     assert causes() == ["not_explained"]

@@ -78,7 +78,7 @@ def read_all(connection: socket.socket) -> bytes:
 
 @pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of descriptors")
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [KINDS[0], *(pytest.param(each, marks=pytest.mark.slow) for each in KINDS[1:])])
 def test_connections_without_a_request_do_not_lock_the_owner_out(kind, tmp_path):
     (tmp_path / "recording.rrd").write_bytes(b"")
     process = subprocess.Popen(
