@@ -101,17 +101,16 @@ def fit_touching_pairs(
     """
     value = np.where(radius_error, 0.5 * np.quantile(gap, FIRST_QUANTILE), 0.0) if start is None else start
     width, scatter = (FIRST_WIDTH if start is None else NEAR_WIDTH) * diameter, 0.0
-    normal, residual, weight = np.eye(len(value)), gap, np.ones(len(gap))
+    normal, residual, weight = np.eye(len(value)), gap + design @ value, np.ones(len(gap))
     for _ in range(ROUNDS):
-        residual = gap + design @ value
         weight = (1.0 + (residual / width) ** 2) ** -2
         normal = design.T @ (weight[:, None] * design)
-        before, value = value, -np.linalg.lstsq(normal, design.T @ (weight * gap), rcond=None)[0]
-        residual = gap + design @ value
+        value = -np.linalg.lstsq(normal, design.T @ (weight * gap), rcond=None)[0]
+        before, residual = residual, gap + design @ value
         overlaps = residual[(residual < 0.0) & (residual > -WIDEST * diameter)]
         scatter = MAD_TO_SD * float(np.median(-overlaps)) if len(overlaps) else 0.0
         last, width = width, max(SHRINK * width, LAST_WIDTH * scatter, NARROWEST * diameter)
-        if width > SHRINK * last and float(np.abs(residual - gap - design @ before).max()) < CONVERGED * scatter:
+        if width > SHRINK * last and float(np.abs(residual - before).max()) < CONVERGED * scatter:
             break
     sd = scatter * np.sqrt(frames * np.diag(np.linalg.pinv(normal)))
     return TouchingFit(

@@ -15,14 +15,16 @@ first frame in which the grain is seen.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from ..bodies.grains import Array
 from ..bodies.wall_shapes import STRAIGHT, Sides, all_sides, circle_ends, circle_parameters, outward_normals
-from .derivatives import Derivatives
+from .derivatives import OF_GRAIN, Derivatives
 from .gaps import GapGeometry, GapRows, MeasuredSequence, measure_gaps
 
 SHARED = 5  # greatest number of shared unknowns of a gap: a wall and its tilt, or classes, scale and lens
@@ -147,6 +149,13 @@ class GapEquations:
         self._cosine, self._sine = np.cos(angle), np.sin(angle)
         self._distortion = radial_distortion(sequence)
 
+    def thinned(self, count: int) -> GapEquations:
+        """Select at most `count` frames, evenly spaced; the unknowns keep their meaning."""
+        found, k = copy(self), self.sequence.spread_frames(count)
+        found.sequence = self.sequence.thinned(count)
+        found._cosine, found._sine, found._distortion = self._cosine[k], self._sine[k], self._distortion[k]
+        return found
+
     def radius(self, unknowns: Array) -> Array:
         """Compute the corrected radii (n,) [m]."""
         correction = unknowns[self.layout.radius]
@@ -190,11 +199,8 @@ class GapEquations:
         """
         n, layout, count = self.sequence.grain_count, self.layout, rows.count
         i, grain, wall = rows.i.astype(np.int64), rows.second_grain(n).astype(np.int64), rows.with_wall(n)
-        ix, iy = self._in_body_frame(rows.frame, i, geometry.normal)
-        jx, jy = self._in_body_frame(rows.frame, grain, geometry.normal)
-        minus = np.full(count, -1.0)
-        own, other = np.stack([-ix, -iy, minus], axis=1), np.stack([jx, jy, minus], axis=1)
-        other[wall] = 0.0
+        own, other = np.empty((count, OF_GRAIN)), np.empty((count, OF_GRAIN))
+        _derive_grains(rows.frame, i, grain, geometry.normal, self._cosine, self._sine, own, other)
         column, value = np.zeros((count, SHARED), np.int64), np.zeros((count, SHARED))
         start = layout.wall.start
         if self.radius_class is not None:
@@ -231,12 +237,24 @@ class GapEquations:
         end = np.where(wall[:, None], 0.0, self._distortion[k, rows.second_grain(n)])
         return np.einsum("mk,mk->m", geometry.normal, end - self._distortion[k, rows.i])
 
-    def _in_body_frame(self, frame: NDArray, grain: NDArray, normal: Array) -> tuple[Array, Array]:
-        c, s = self._cosine[frame, grain], self._sine[frame, grain]
-        return c * normal[:, 0] + s * normal[:, 1], c * normal[:, 1] - s * normal[:, 0]
-
 
 def _angle_since_first_seen(sequence: MeasuredSequence) -> Array:
     first = np.argmax(sequence.present, axis=0)
     start = sequence.rotation[first, np.arange(sequence.grain_count)]
     return np.where(sequence.present, sequence.rotation - start, 0.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _derive_grains(frame, first, second, normal, cosine, sine, own, other):  # type: ignore[no-untyped-def]
+    """Set the derivatives (m, 3) by the errors of both grains; a wall's row, where second is first, has one grain."""
+    for c in range(len(frame)):
+        k, i, j, x, y = frame[c], first[c], second[c], normal[c, 0], normal[c, 1]
+        own[c, 0] = -(cosine[k, i] * x + sine[k, i] * y)
+        own[c, 1] = -(cosine[k, i] * y - sine[k, i] * x)
+        own[c, 2] = -1.0
+        if j != i:
+            other[c, 0] = cosine[k, j] * x + sine[k, j] * y
+            other[c, 1] = cosine[k, j] * y - sine[k, j] * x
+            other[c, 2] = -1.0
+        else:
+            other[c, :] = 0.0

@@ -22,12 +22,14 @@ from numpy.typing import NDArray
 from ..bodies.grains import Array
 from .equations import GapEquations
 from .gap_error_draws import GapErrorDraws
+from .gaps import GapRows
 from .normal_equations import Couplings, NormalEquations
 from .priors import CalibrationPairs, CalibrationPriors, find_calibration_pairs, prior_vector, reduce_priors
 from .weights import FINAL_SCALE, weigh_gaps, weighting_bias
 
 ANNEALING_ROUNDS = 9  # reduce s from the scale of the errors to that of the noise
 REFINING_ROUNDS = 6  # at the scale of the noise, with updates of noise and priors
+ANNEALING_FRAMES = 16  # photographs that suffice to come near the solution, evenly spaced
 ROUNDS = ANNEALING_ROUNDS + REFINING_ROUNDS
 ANNEALED_VARIANCE = 0.3  # lower limit of a row's variance, over s²: model errors are large while s is
 NEGLIGIBLE_WEIGHT = 1e-3  # rows of smaller weight are left out of a round
@@ -37,7 +39,7 @@ SYSTEMATIC_SD = 0.5  # relative standard deviation of the typical overlaps and o
 # The draws do not contain the uncertainty of which pairs touch. Against simulated truths the errors are 0.57 to 1.16
 # times the standard deviations with this factor.
 SD_FACTOR = 1.2
-PRIOR_SAMPLES = 8  # posterior draws that estimate a mean variance
+PRIOR_SAMPLES = 4  # posterior draws that estimate a mean variance
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,18 +85,12 @@ def fit_gaps(
     The equations of a round stand in the module's docstring. Standard deviations are 1.2 times the rms of the draws of
     `_LinearStep.draw`, at most the prior's.
     """
-    unknowns = np.zeros(equations.layout.count)
+    unknowns = _anneal(equations.thinned(ANNEALING_FRAMES), priors, overlap)
     candidates = find_calibration_pairs(equations.sequence, priors, overlap)
     rows, limits = candidates.rows, priors
-    before = equations.measure(rows, unknowns).gap
-    n = equations.sequence.grain_count
-    couplings = Couplings.of(n, rows.i, rows.second_grain(n))
-    end = FINAL_SCALE * candidates.noise
-    for number in range(ANNEALING_ROUNDS):
-        annealed = number / ANNEALING_ROUNDS
-        s = np.maximum(candidates.scale ** (1.0 - annealed) * end**annealed, end)
-        unknowns = _LinearStep(equations, candidates, couplings, unknowns, s, priors).solution()
-    step = _LinearStep(equations, candidates, couplings, unknowns, end, priors)
+    before = equations.measure(rows, np.zeros_like(unknowns)).gap
+    couplings = _couplings(equations, rows)
+    step = _LinearStep(equations, candidates, couplings, unknowns, FINAL_SCALE * candidates.noise, priors)
     for _ in range(REFINING_ROUNDS - 1):
         unknowns = step.solution()
         # Overlaps of contacts are part of the estimates already: drawn again, they would widen the priors twice.
@@ -106,6 +102,23 @@ def fit_gaps(
     sd = np.minimum(np.sqrt(np.mean(draws**2, axis=0)), prior_vector(equations, priors))
     after = equations.measure(rows, unknowns).gap
     return GapFit(unknowns, sd, step.gap_rms(draws), priors, candidates, before, after, step.touching)
+
+
+def _anneal(equations: GapEquations, priors: CalibrationPriors, overlap: float) -> Array:
+    """Approach the solution (u,) while the scale of the weights goes from that of the errors to that of the noise."""
+    candidates = find_calibration_pairs(equations.sequence, priors, overlap)
+    couplings, unknowns = _couplings(equations, candidates.rows), np.zeros(equations.layout.count)
+    end = FINAL_SCALE * candidates.noise
+    for number in range(ANNEALING_ROUNDS):
+        annealed = number / ANNEALING_ROUNDS
+        s = np.maximum(candidates.scale ** (1.0 - annealed) * end**annealed, end)
+        unknowns = _LinearStep(equations, candidates, couplings, unknowns, s, priors).solution()
+    return unknowns
+
+
+def _couplings(equations: GapEquations, rows: GapRows) -> Couplings:
+    n = equations.sequence.grain_count
+    return Couplings.of(n, rows.i, rows.second_grain(n))
 
 
 class _LinearStep:

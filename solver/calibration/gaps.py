@@ -42,10 +42,14 @@ class MeasuredSequence:
             if not np.all(np.isfinite(getattr(self, name)[self.present])):
                 raise ValueError(f"the {name} of a present grain is not finite")
 
+    def spread_frames(self, count: int) -> NDArray[np.int64]:
+        """Choose at most `count` frames, evenly spaced, the first and the last included."""
+        f = self.frame_count
+        return np.unique(np.linspace(0, f - 1, min(f, count)).round().astype(np.int64))
+
     def thinned(self, count: int) -> MeasuredSequence:
         """Select at most `count` frames, evenly spaced."""
-        f = self.frame_count
-        k = np.unique(np.linspace(0, f - 1, min(f, count)).round().astype(np.int64))
+        k = self.spread_frames(count)
         return MeasuredSequence(
             self.radius, self.position[k], self.rotation[k], self.present[k], self.endpoints[k], self.sigma[k],
             self.side, None if self.cell is None else self.cell[k],

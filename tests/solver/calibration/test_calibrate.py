@@ -120,6 +120,24 @@ def test_derivatives_match_finite_differences(true, rng):
     np.testing.assert_allclose(derivative, (ahead - behind) / (2 * step), rtol=1e-6, atol=1e-6)
 
 
+def test_equations_of_some_frames_measure_the_same_gaps_with_the_same_unknowns(true, rng):
+    present = true.present.copy()
+    present[0, :5] = False  # their angles count from another frame
+    whole = GapEquations(replace(true, present=present))
+    count = true.frame_count // 2
+    some, k = whole.thinned(count), true.spread_frames(count)
+    rows = find_gap_rows(some.sequence, 0.05 * RADIUS)
+    unknowns = rng.normal(0.0, 50e-6, whole.layout.count)
+    at = replace(rows, frame=k[rows.frame].astype(np.int32))
+    expected = whole.measure(at, unknowns)
+    found = some.measure(rows, unknowns)
+    np.testing.assert_array_equal(found.gap, expected.gap)
+    assert len(k) == count
+    assert (k[0], k[-1]) == (0, true.frame_count - 1)
+    np.testing.assert_array_equal(some.derive(rows, found).value, whole.derive(at, expected).value)
+    np.testing.assert_array_equal(some.derive(rows, found).own, whole.derive(at, expected).own)
+
+
 def test_contact_width_ignores_open_gaps(rng):
     touching, opened = rng.normal(0.0, 5e-6, 20_000), rng.uniform(0.0, 1e-3, 100_000) + 1e-5
     few_percent = 0.03  # of a median over 10 000 values
