@@ -87,6 +87,13 @@ def study(
     scenarios: Annotated[
         tuple[ScenarioName, ...], tyro.conf.arg(name="worlds", help="only these scenarios; default: all")
     ] = (),
+    varied: Annotated[
+        bool,
+        tyro.conf.arg(
+            help="draw step, stiffness, friction, sizes, noise and number of rods of every scenario at random, by its "
+            "seed"
+        ),
+    ] = False,
     jobs: Annotated[int, tyro.conf.arg(metavar="N", help="worlds, trust: processes")] = 1,
     fit: Annotated[
         tuple[int, ...],
@@ -138,7 +145,7 @@ def study(
     from ...synthetic.scenarios.scenario_folder import GRAINS
 
     chosen = (*settings, "solver.estimator=nlgs") if subject == "worlds" and estimator == "nlgs" else settings
-    plan = StudyPlan(GRAINS if grains is None else grains, out / "worlds", chosen)
+    plan = StudyPlan(GRAINS if grains is None else grains, out / "worlds", chosen, varied)
     request = _StudyRequest(plan, scenarios, seeds, out, quiet)
     if subject == "report" and frame is None:
         return _study_report(request, page, as_json=as_json)

@@ -45,8 +45,7 @@ from ...solver.sequence.frame_problem import SequenceProblem
 from ...solver.sequence.state import SequenceState
 from ...solver.statistics.agreement import pearson
 from ...synthetic.scenarios.preset_names import ScenarioName
-from ...synthetic.scenarios.scenario_folder import make_scenario
-from .scenario_score import ScenarioSolution, StudyPlan, correct_scenario, solve_scenario, true_forces
+from .scenario_score import ScenarioSolution, StudyPlan, correct_scenario, make_planned, solve_scenario, true_forces
 from .trust_study import LEFT_OUT
 
 ALONE = "solver.positions=never", "solver.keep_members=true"
@@ -93,9 +92,7 @@ def sample_mixtures(
         progress("mixtures", done, len(cases))
         with TemporaryDirectory() as folder:
             try:
-                made = make_scenario(
-                    Path(folder), name, seed, grains=plan.grains, cache=plan.folder / "kept", progress=progress
-                )
+                made = make_planned(plan, Path(folder), name, seed, progress)
                 if correct_scenario(load_experiment(made.folder, plan.settings)).settings.soft:
                     continue  # a run takes overlaps for forces, and weighs them so
                 experiment = load_experiment(made.folder, motion.settings)

@@ -20,9 +20,8 @@ from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
 from ...solver.statistics.agreement import pearson
 from ...synthetic.scenarios.preset_names import ScenarioName
-from ...synthetic.scenarios.scenario_folder import make_scenario
 from ...synthetic.scenarios.scenario_table import SCENARIOS
-from .scenario_score import ScenarioScore, StudyPlan, read_scenario
+from .scenario_score import ScenarioScore, StudyPlan, make_planned, read_scenario
 from .score_table import describe_seeds, score_scenarios
 
 # The causes that a diagnosis should name. Of all other scenarios it should name none, except "not_explained" where the
@@ -164,7 +163,7 @@ def print_predictions(console: Console, outcomes: Sequence[PredictionOutcome]) -
 
 def _predict(plan: StudyPlan, scenario: ScenarioName, seed: int) -> Prediction | None:
     with TemporaryDirectory() as folder:
-        made = make_scenario(Path(folder), scenario, seed, grains=plan.grains, cache=plan.folder / "kept")
+        made = make_planned(plan, Path(folder), scenario, seed)
         experiment = load_experiment(made.folder, plan.settings)
         try:
             tracks, walls = read_scenario(experiment)

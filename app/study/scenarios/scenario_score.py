@@ -35,7 +35,7 @@ from ...solver.dem.dem_truth import UnbalancedError
 from ...solver.frame_forces import FrameForces, FrameStatus
 from ...solver.statistics.agreement import Agreement, compare_forces
 from ...synthetic.scenarios.preset_names import ScenarioName
-from ...synthetic.scenarios.scenario_folder import make_scenario
+from ...synthetic.scenarios.scenario_folder import MadeScenario, make_scenario
 from ...synthetic.scenarios.scenario_table import SCENARIOS
 from ...tracks import Tracks, WallTracks
 from ..baselines import baseline_lists, compare_baselines
@@ -101,6 +101,16 @@ class StudyPlan:
     grains: int
     folder: Path  # of simulated truths and finished scores
     settings: tuple[str, ...] = ()  # KEY=VALUE laid over every experiment
+    varied: bool = False  # whether the parameters of every scenario are drawn at random
+
+
+def make_planned(
+    plan: StudyPlan, folder: Path, scenario: ScenarioName, seed: int, progress: Progress = no_progress
+) -> MadeScenario:
+    """Write a scenario of a plan as an experiment folder. Raises UnbalancedError."""
+    return make_scenario(
+        folder, scenario, seed, grains=plan.grains, varied=plan.varied, cache=plan.folder / "kept", progress=progress
+    )
 
 
 def score_scenario(
@@ -109,9 +119,7 @@ def score_scenario(
     """Make a scenario, solve it and compare it with the truth; one that does not rest counts as refused."""
     with TemporaryDirectory() as folder:
         try:
-            made = make_scenario(
-                Path(folder), scenario, seed, grains=plan.grains, cache=plan.folder / "kept", progress=progress
-            )
+            made = make_planned(plan, Path(folder), scenario, seed, progress)
         except UnbalancedError as error:
             return ScenarioScore(scenario, seed, str(error))
         began = time.process_time()

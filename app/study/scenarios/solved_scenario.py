@@ -18,8 +18,7 @@ from ...solver.bodies.grains import Array
 from ...solver.contacts.pairs import Keys
 from ...solver.frame_forces import FrameForces
 from ...synthetic.scenarios.preset_names import ScenarioName
-from ...synthetic.scenarios.scenario_folder import make_scenario
-from .scenario_score import ScenarioSolution, StudyPlan, solve_scenario, true_forces
+from .scenario_score import ScenarioSolution, StudyPlan, make_planned, solve_scenario, true_forces
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +47,7 @@ def solve_one(
 ) -> SolvedScenario:
     """Make and solve a scenario; members: solutions with resampled input. Raises UnbalancedError."""
     with TemporaryDirectory() as folder:
-        made = make_scenario(
-            Path(folder), scenario, seed, grains=plan.grains, cache=plan.folder / "kept", progress=progress
-        )
+        made = make_planned(plan, Path(folder), scenario, seed, progress)
         experiment = load_experiment(made.folder, plan.settings)
         solution = solve_scenario(experiment, progress)
         again = _solve_again(experiment, solution.sequence, members) if members else ()

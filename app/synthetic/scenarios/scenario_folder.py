@@ -33,6 +33,7 @@ from .loading_paths import LoadingPath, simulate_loading
 from .observed_data import observe_truth, write_observed
 from .preset_names import ScenarioName
 from .scenario_table import SCENARIOS, Scenario
+from .variation import vary_scenario
 
 LEAST_GRAINS = 40  # with fewer, some scenarios have no grain to omit or to roll on
 GRAINS = 450  # rods of a scenario: enough for statistics, and simulated within seconds
@@ -55,6 +56,7 @@ def make_scenario(
     *,
     grains: int | None = None,
     noise: float | None = None,
+    varied: bool = False,
     cache: Path | None = None,
     progress: Progress = no_progress,
 ) -> MadeScenario:
@@ -70,6 +72,8 @@ def make_scenario(
         Number of rods; default GRAINS.
     noise : float, optional
         Standard deviation of a position component [m]; default: the scenario's.
+    varied : bool
+        Whether step, stiffness, friction, sizes, noise and number of rods are drawn at random, see `vary_scenario`.
     cache : Path, optional
         Folder of simulated truths, read and added to.
     progress : Progress
@@ -88,6 +92,9 @@ def make_scenario(
     grains = check_output(out, grains)
     _check_choices(seed, noise)
     scenario = SCENARIOS[name]
+    if varied:
+        scenario, factor = vary_scenario(name, seed)
+        grains = max(round(factor * grains), LEAST_GRAINS)
     truth = load_or_simulate(scenario.loading, grains, seed, cache, progress)
     noise = scenario.noise if noise is None else noise
     loading, rng = scenario.loading, np.random.default_rng([seed, OBSERVED])
