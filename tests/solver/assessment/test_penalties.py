@@ -167,7 +167,9 @@ def test_two_photographs_alone_are_not_trusted():
     assert limit_for_few_photographs(low, 2) is low
 
 
-@pytest.mark.parametrize(("by_intervals", "most"), [(0.95, 1.0), (0.7, 0.85), (0.6, 0.75), (0.5, 0.45), (0.2, 0.0)])
+@pytest.mark.parametrize(
+    ("by_intervals", "most"), [(0.95, 1.0), (0.57, 1.0), (0.5, 0.85), (0.4, 0.6), (0.2, 0.1), (0.15, 0.0)]
+)
 def test_nothing_is_trusted_beyond_the_error_bars(by_intervals, most):
     frame = replace(make_results(1, 8, 7, sweeps=2).frames[0], trust=0.9, expected_correlation=0.97, soft=0)
     fn = np.linspace(1.0, 3.0, len(frame.fn))
