@@ -88,12 +88,8 @@ def study(
         tuple[ScenarioName, ...], tyro.conf.arg(name="worlds", help="only these scenarios; default: all")
     ] = (),
     varied: Annotated[
-        bool,
-        tyro.conf.arg(
-            help="draw step, stiffness, friction, sizes, noise and number of rods of every scenario at random, by its "
-            "seed"
-        ),
-    ] = False,
+        tuple[int, ...], tyro.conf.arg(metavar="SEED", help="seeds that draw step, stiffness, friction, noise … too")
+    ] = (),
     jobs: Annotated[int, tyro.conf.arg(metavar="N", help="worlds, trust: processes")] = 1,
     fit: Annotated[
         tuple[int, ...],
@@ -145,7 +141,7 @@ def study(
     from ...synthetic.scenarios.scenario_folder import GRAINS
 
     chosen = (*settings, "solver.estimator=nlgs") if subject == "worlds" and estimator == "nlgs" else settings
-    plan = StudyPlan(GRAINS if grains is None else grains, out / "worlds", chosen, varied)
+    plan = StudyPlan(GRAINS if grains is None else grains, out / "worlds", chosen, frozenset(varied))
     request = _StudyRequest(plan, scenarios, seeds, out, quiet)
     if subject == "report" and frame is None:
         return _study_report(request, page, as_json=as_json)

@@ -35,7 +35,7 @@ from ...solver.dem.dem_truth import UnbalancedError
 from ...solver.frame_forces import FrameForces, FrameStatus
 from ...solver.statistics.agreement import Agreement, compare_forces
 from ...synthetic.scenarios.preset_names import ScenarioName
-from ...synthetic.scenarios.scenario_folder import MadeScenario, make_scenario
+from ...synthetic.scenarios.scenario_folder import MadeScenario, make_scenario, make_varied_scenario
 from ...synthetic.scenarios.scenario_table import SCENARIOS
 from ...tracks import Tracks, WallTracks
 from ..baselines import baseline_lists, compare_baselines
@@ -101,16 +101,15 @@ class StudyPlan:
     grains: int
     folder: Path  # of simulated truths and finished scores
     settings: tuple[str, ...] = ()  # KEY=VALUE laid over every experiment
-    varied: bool = False  # whether the parameters of every scenario are drawn at random
+    varied: frozenset[int] = frozenset()  # seeds with which the parameters of a scenario are drawn at random
 
 
 def make_planned(
     plan: StudyPlan, folder: Path, scenario: ScenarioName, seed: int, progress: Progress = no_progress
 ) -> MadeScenario:
     """Write a scenario of a plan as an experiment folder. Raises UnbalancedError."""
-    return make_scenario(
-        folder, scenario, seed, grains=plan.grains, varied=plan.varied, cache=plan.folder / "kept", progress=progress
-    )
+    make = make_varied_scenario if seed in plan.varied else make_scenario
+    return make(folder, scenario, seed, grains=plan.grains, cache=plan.folder / "kept", progress=progress)
 
 
 def score_scenario(

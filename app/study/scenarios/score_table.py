@@ -119,7 +119,7 @@ def _score_case(plan: StudyPlan, case: tuple[ScenarioName, int]) -> ScenarioScor
 
 
 def _file(plan: StudyPlan, scenario: ScenarioName, seed: int) -> Path:
-    inputs = f"{_code_fingerprint()} {plan.grains} {plan.settings} {plan.varied}"
+    inputs = f"{_code_fingerprint()} {plan.grains} {plan.settings} {seed in plan.varied}"
     key = hashlib.sha256(inputs.encode()).hexdigest()[:12]
     return plan.folder / ROWS / f"{scenario}_{seed}_{key}.json"
 

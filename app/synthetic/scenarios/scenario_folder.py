@@ -56,7 +56,6 @@ def make_scenario(
     *,
     grains: int | None = None,
     noise: float | None = None,
-    varied: bool = False,
     cache: Path | None = None,
     progress: Progress = no_progress,
 ) -> MadeScenario:
@@ -72,8 +71,6 @@ def make_scenario(
         Number of rods; default GRAINS.
     noise : float, optional
         Standard deviation of a position component [m]; default: the scenario's.
-    varied : bool
-        Whether step, stiffness, friction, sizes, noise and number of rods are drawn at random, see `vary_scenario`.
     cache : Path, optional
         Folder of simulated truths, read and added to.
     progress : Progress
@@ -91,14 +88,31 @@ def make_scenario(
     """
     grains = check_output(out, grains)
     _check_choices(seed, noise)
-    scenario = SCENARIOS[name]
-    if varied:
-        scenario, factor = vary_scenario(name, seed)
-        grains = max(round(factor * grains), LEAST_GRAINS)
+    scenario = SCENARIOS[name] if noise is None else replace(SCENARIOS[name], noise=noise)
+    return _write_scenario(out, name, scenario, seed, grains, cache, progress)
+
+
+def make_varied_scenario(
+    out: Path,
+    name: ScenarioName,
+    seed: int,
+    *,
+    grains: int,
+    cache: Path | None = None,
+    progress: Progress = no_progress,
+) -> MadeScenario:
+    """Write a scenario whose parameters are drawn at random, see `vary_scenario`; otherwise as `make_scenario`."""
+    scenario, factor = vary_scenario(name, seed)
+    grains = check_output(out, max(round(factor * grains), LEAST_GRAINS))
+    return _write_scenario(out, name, scenario, seed, grains, cache, progress)
+
+
+def _write_scenario(
+    out: Path, name: ScenarioName, scenario: Scenario, seed: int, grains: int, cache: Path | None, progress: Progress
+) -> MadeScenario:
     truth = load_or_simulate(scenario.loading, grains, seed, cache, progress)
-    noise = scenario.noise if noise is None else noise
     loading, rng = scenario.loading, np.random.default_rng([seed, OBSERVED])
-    measured = observe_truth(truth, loading.plates, noise, rng, loading.measured)
+    measured = observe_truth(truth, loading.plates, scenario.noise, rng, loading.measured)
     observed = scenario.departure(measured, np.random.default_rng([seed, DEPARTED]))
     out.mkdir(parents=True, exist_ok=True)
     remark = f"Scenario {name}, seed {seed}, {grains} rods: {scenario.meaning}."

@@ -11,8 +11,8 @@ import pytest
 from rich.console import Console
 from rodsight.cli.main import main
 from rodsight.solver.dem.dem_truth import UnbalancedError
-from rodsight.study.scenarios import score_table
-from rodsight.study.scenarios.scenario_score import ScenarioScore, StudyPlan, score_scenario
+from rodsight.study.scenarios import scenario_score, score_table
+from rodsight.study.scenarios.scenario_score import ScenarioScore, StudyPlan, make_planned, score_scenario
 from rodsight.study.scenarios.score_table import as_json, print_scores, score_scenarios
 from rodsight.synthetic.scenarios.preset_names import ScenarioName
 from rodsight.synthetic.scenarios.scenario_table import SCENARIOS
@@ -86,7 +86,18 @@ def test_finished_scores_are_reused_until_settings_or_size_change(tmp_path: Path
     assert steps == [(1, 2), (2, 2)]
     score_scenarios(replace(plan, settings=("solver.kappa=0.2",)), ["shear"], [1])
     score_scenarios(replace(plan, grains=FEW + 1), ["shear"], [1])
-    assert solved[5:] == [("shear", 1), ("shear", 1)]
+    score_scenarios(replace(plan, varied=frozenset({1})), ["shear"], [2, 1])  # seed 2 as before
+    assert solved[5:] == [("shear", 1), ("shear", 1), ("shear", 1)]
+
+
+def test_seeds_that_vary_draw_the_parameters_of_their_scenarios(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    made: list[str] = []
+    for name in ("make_scenario", "make_varied_scenario"):
+        monkeypatch.setattr(scenario_score, name, lambda *_, name=name, **__: made.append(name))
+    plan = StudyPlan(FEW, tmp_path, varied=frozenset({3}))
+    for seed in (2, 3):
+        make_planned(plan, tmp_path, "shear", seed)
+    assert made == ["make_scenario", "make_varied_scenario"]
 
 
 @pytest.fixture

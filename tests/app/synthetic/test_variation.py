@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rodsight.synthetic.dense_packing import choose_radii
 from rodsight.synthetic.scenarios.preset_names import ScenarioName
-from rodsight.synthetic.scenarios.scenario_folder import LEAST_GRAINS, make_scenario
+from rodsight.synthetic.scenarios.scenario_folder import LEAST_GRAINS, make_scenario, make_varied_scenario
 from rodsight.synthetic.scenarios.scenario_table import SCENARIOS
 from rodsight.synthetic.scenarios.variation import (
     AS_STIFF,
@@ -82,7 +82,7 @@ def test_parameters_are_within_their_ranges_and_the_kind_keeps_its_meaning(name:
 @pytest.mark.thorough
 @pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
 def test_a_varied_folder_has_the_drawn_number_of_rods_and_friction(tmp_path):
-    made = make_scenario(tmp_path / "varied", "shear", 4, grains=LEAST_GRAINS, varied=True)
+    made = make_varied_scenario(tmp_path / "varied", "shear", 4, grains=LEAST_GRAINS)
     drawn, factor = vary_scenario("shear", 4)
     assert len(made.truth.radius) == max(round(factor * LEAST_GRAINS), LEAST_GRAINS)
     assert made.scenario == drawn

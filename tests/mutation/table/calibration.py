@@ -9,8 +9,10 @@ MUTANTS = [
     *mutants_of(
         "solver/calibration/equations.py",
         CALIBRATE,
-        ("np.stack([jx, jy, minus], axis=1)", "np.stack([-jx, jy, minus], axis=1)"),
-        ("np.stack([-ix, -iy, minus], axis=1)", "np.stack([-ix, -iy, -minus], axis=1)"),
+        ("other[c, 0] = cosine", "other[c, 0] = -cosine"),
+        ("own[c, 2] = -1.0", "own[c, 2] = 1.0"),
+        ("        if j != i:\n            other[c, 0]", "        if True:\n            other[c, 0]"),
+        ("self._cosine[k], self._sine[k]", "self._cosine[: len(k)], self._sine[: len(k)]"),
         ("-geometry.along[wall]", "geometry.along[wall]"),
         (
             "[c * offset[:, 0] - s * offset[:, 1], s * offset[:, 0]",
