@@ -20,22 +20,29 @@ INSIDE = 3.0  # touching neighbours that outweigh one inside which the grain lie
 # Touching neighbours per photograph by which a lesser and a greater size must be better: a loose grain touches none,
 # and by chance the hole that it is in may have the size of a greater one.
 LESSER, GREATER = 1.5, 2.5
+ALIKE = 0.5  # difference of two scores that shows no size
 USUAL, HARD = 0.98, 0.5  # quantile of the overlaps of other grains, and its limit over that of a touching pair
 TIGHT = 0.1  # of a touching pair: median overlap of a grain with its neighbours that is let pass whatever others have
 ROUNDS = 20
+KNOWN = 0.6  # fraction of the grains at a wall that touch it, below which the wall is not where it is stated
 MOST = 0.3  # fraction of the grains: if more seem exchanged, something else is wrong
 
 
 @dataclass(frozen=True, slots=True)
 class _Pairs:
-    """Candidate pairs (m,) of all photographs that are read, each in both orders."""
+    """Candidate pairs (m,) of all photographs that are read, those of grains in both orders."""
 
     grain: NDArray[np.int64]
-    other: NDArray[np.int64]
-    distance: Array  # [m] of the centres
+    other: NDArray[np.int64]  # a grain, or number of grains + a wall, whose radius is zero
+    distance: Array  # [m] of the centres, or of the centre from the wall
+
+    def select(self, chosen: NDArray[np.bool_]) -> _Pairs:
+        return _Pairs(self.grain[chosen], self.other[chosen], self.distance[chosen])
 
 
-def find_exchanged_sizes(position: Array, radius: Array, classes: NDArray[np.int64]) -> Array:
+def find_exchanged_sizes(
+    position: Array, radius: Array, classes: NDArray[np.int64], from_walls: Array | None = None
+) -> Array:
     """Find the radii of grains that are stated to be of another of the stated sizes.
 
     Parameters
@@ -46,6 +53,9 @@ def find_exchanged_sizes(position: Array, radius: Array, classes: NDArray[np.int
         Stated radii [m].
     classes : (n,)
         Size of each grain, from 0.
+    from_walls : (f, n, w), optional
+        Distances [m] of the centres from walls, NaN beside them. A wall counts if most grains at it touch it: others
+        are not where they are stated to be.
 
     Returns
     -------
@@ -64,16 +74,23 @@ def find_exchanged_sizes(position: Array, radius: Array, classes: NDArray[np.int
     if len(sizes) < 2:
         return radius
     touch = TOUCHING * float(np.diff(np.sort(sizes)).min())
-    pairs, frames = _candidate_pairs(position, 2.0 * float(sizes.max()) + touch)
-    found = radius.copy()
+    reach = float(sizes.max()) + touch
+    from_walls = np.empty((*position.shape[:2], 0)) if from_walls is None else from_walls
+    pairs, frames = _candidate_pairs(position, from_walls, float(sizes.max()) + reach, reach)
+    pairs = _at_known_walls(pairs, radius, touch)
+    found, of_walls = radius.copy(), np.zeros(from_walls.shape[2])
     for _ in range(ROUNDS):
-        own = _score(pairs, found, found, touch) / frames
-        trial = np.stack([_score(pairs, np.full_like(found, size), found, touch) / frames for size in sizes])
-        best = trial.argmax(axis=0)
+        others = np.append(found, of_walls)
+        own = _score(pairs, found, others, touch) / frames
+        trial = np.stack([_score(pairs, np.full_like(found, size), others, touch) / frames for size in sizes])
+        # Of sizes that are as good the one nearest to what is stated: a loose grain touches none of its neighbours.
+        apart = np.where(trial < trial.max(axis=0) - ALIKE, np.inf, np.abs(sizes[:, None] - radius))
+        best = apart.argmin(axis=0)
         gain = trial[best, np.arange(len(found))] - own
         change = gain > np.where(sizes[best] < found, LESSER, GREATER)
+        change |= (gain > -ALIKE) & (np.abs(sizes[best] - radius) < np.abs(found - radius) - touch)
         rival = np.zeros(len(found))
-        np.maximum.at(rival, pairs.grain, np.where(change, gain, 0.0)[pairs.other])
+        np.maximum.at(rival, pairs.grain, np.append(np.where(change, gain, 0.0), of_walls)[pairs.other])
         change &= gain >= rival
         if not change.any():
             break
@@ -81,6 +98,7 @@ def find_exchanged_sizes(position: Array, radius: Array, classes: NDArray[np.int
     exchanged = np.abs(found - radius) > touch
     if not exchanged.any():
         return radius
+    pairs = pairs.select(pairs.other < len(radius))
     kept = ~(exchanged[pairs.grain] | exchanged[pairs.other])
     overlap = (radius[pairs.grain] + radius[pairs.other] - pairs.distance)[kept]
     usual = float(np.quantile(np.append(overlap[overlap > 0.0], 0.0), USUAL))
@@ -94,27 +112,39 @@ def find_exchanged_sizes(position: Array, radius: Array, classes: NDArray[np.int
     return np.where(exchanged, found, radius)
 
 
-def _candidate_pairs(position: Array, reach: float) -> tuple[_Pairs, int]:
-    """List the pairs nearer than `reach` [m], and the number of photographs that were read."""
+def _at_known_walls(pairs: _Pairs, radius: Array, touch: float) -> _Pairs:
+    """Leave out walls that fewer than KNOWN of the grains touch that are at them with the stated radii (n,)."""
+    at_wall = pairs.other >= len(radius)
+    gap = np.where(at_wall, pairs.distance - radius[pairs.grain], np.inf)
+    here, touching = gap < touch, np.abs(gap) < touch
+    count = np.bincount(pairs.other, weights=here)
+    known = np.bincount(pairs.other, weights=touching) >= KNOWN * np.maximum(count, 1.0)
+    return pairs.select(~at_wall | known[pairs.other])
+
+
+def _candidate_pairs(position: Array, from_walls: Array, reach: float, at_walls: float) -> tuple[_Pairs, int]:
+    """List the pairs nearer than `reach`, or `at_walls` [m], and the number of photographs that were read."""
     read = np.unique(np.linspace(0, len(position) - 1, min(len(position), MOST_FRAMES)).round().astype(np.int64))
+    grains = position.shape[1]
     first, second, apart = [], [], []
-    for place in position[read]:
+    for place, depth in zip(position[read], from_walls[read], strict=True):
         here = np.flatnonzero(np.isfinite(place[:, 0]))
         if not len(here):
             continue
         near = here[KDTree(place[here]).query_pairs(reach, output_type="ndarray")]
-        first.append(near[:, 0])
-        second.append(near[:, 1])
-        apart.append(np.linalg.norm(place[near[:, 0]] - place[near[:, 1]], axis=1))
+        distance = np.linalg.norm(place[near[:, 0]] - place[near[:, 1]], axis=1)
+        grain, wall = np.nonzero(depth < at_walls)
+        first += [near[:, 0], near[:, 1], grain]
+        second += [near[:, 1], near[:, 0], grains + wall]
+        apart += [distance, distance, depth[grain, wall]]
     if not apart:
         nothing = np.empty(0, np.int64)
         return _Pairs(nothing, nothing, np.empty(0)), len(read)
-    i, j, distance = np.concatenate(first), np.concatenate(second), np.concatenate(apart)
-    return _Pairs(np.concatenate([i, j]), np.concatenate([j, i]), np.concatenate([distance, distance])), len(read)
+    return _Pairs(np.concatenate(first), np.concatenate(second), np.concatenate(apart)), len(read)
 
 
 def _score(pairs: _Pairs, own: Array, others: Array, touch: float) -> Array:
-    """Score (n,) of radii `own` (n,) among neighbours of radii `others` (n,) [m], over all photographs."""
+    """Score (n,) of radii `own` (n,) among grains and walls of radii `others` (n + w,) [m], over all photographs."""
     gap = pairs.distance - own[pairs.grain] - others[pairs.other]
     inside = np.clip(-gap / touch - 1.0, 0.0, 1.0)
     value = (np.abs(gap) < touch).astype(np.float64) - INSIDE * inside

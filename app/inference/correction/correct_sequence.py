@@ -55,7 +55,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     walls, settings = inputs.walls, inputs.settings
     given, id_remark = restore_exchanged_ids(inputs.tracks)
     walls, failed = complete_walls(given, walls)
-    given, size_remark = (given, "") if settings.calibration is None else correct_exchanged_sizes(given)
+    given, size_remark = (given, "") if settings.calibration is None else correct_exchanged_sizes(given, walls)
     tracks, outlier_remark = remove_outliers(given, walls)
     tracks, gap_remark = interpolate_short_gaps(tracks, walls)
     nothing_seen = len(failed) == tracks.frame_count

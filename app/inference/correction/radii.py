@@ -15,6 +15,7 @@ from ...solver.bodies.interpolation import interpolate_ignored_frames
 from ...solver.bodies.motion import Snapshot
 from ...solver.bodies.packing import Packing
 from ...solver.bodies.rods import RodMaterial
+from ...solver.bodies.wall_shapes import beside_wall, distance_from_walls
 from ...solver.boundary.exchanged_sizes import find_exchanged_sizes
 from ...solver.boundary.size_classes import find_size_classes
 from ...solver.calibration.calibrate import Calibration
@@ -37,8 +38,8 @@ READ, MOST = 6, 0.3  # photographs that are read; fraction of the rods beyond wh
 FEWEST = 30  # overlaps of a size in all photographs, with which it counts
 
 
-def correct_exchanged_sizes(tracks: Tracks) -> tuple[Tracks, str]:
-    """Give rods that are stated to be of another size the size with which they touch their neighbours.
+def correct_exchanged_sizes(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, str]:
+    """Give rods that are stated to be of another size the size with which they touch their neighbours and walls.
 
     Returns
     -------
@@ -50,7 +51,11 @@ def correct_exchanged_sizes(tracks: Tracks) -> tuple[Tracks, str]:
     if classes is None:
         return tracks, ""
     position = np.where(tracks.present[..., None], tracks.position, np.nan)
-    radius = find_exchanged_sizes(position, tracks.radius, classes)
+    place, ends, side = position[:, :, None], walls.endpoints[:, None], walls.sides
+    margin = np.broadcast_to(tracks.radius[:, None], (tracks.grain_count, walls.count))
+    beside = beside_wall(ends, side, place, margin)
+    from_walls = np.where(beside, distance_from_walls(ends, side, place), np.nan)
+    radius = find_exchanged_sizes(position, tracks.radius, classes, from_walls)
     changed = np.flatnonzero(radius != tracks.radius)
     if not len(changed):
         return tracks, ""

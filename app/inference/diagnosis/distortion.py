@@ -22,7 +22,7 @@ def undistorted(
     """
     settings, tracks, exchanged = inputs.settings, inputs.tracks, ""
     if settings.calibration is not None:
-        tracks, exchanged = correct_exchanged_sizes(tracks)
+        tracks, exchanged = correct_exchanged_sizes(tracks, walls)
     named = [finding("exchanged_sizes", exchanged)] if exchanged else []
     if not (camera and seeks_distortion(inputs, walls)):
         return tracks, walls, named

@@ -115,4 +115,17 @@ MUTANTS = [
             "column[:, 0], column[:, 2] = of_class[grain], of_class[grain]",
         ),
     ),
+    *mutants_of(
+        "solver/boundary/exchanged_sizes.py",
+        "tests/solver/boundary/test_exchanged_sizes.py",
+        ("trial < trial.max(axis=0) - ALIKE", "trial < trial.max(axis=0) - 9.0"),
+        ("np.abs(sizes[:, None] - radius))\n        best", "0.0 * trial)\n        best"),
+        ("change |= (gain > -ALIKE)", "change |= (gain > 9.0)"),
+        (">= KNOWN * np.maximum(count, 1.0)", ">= 0.0 * count"),
+        ("pairs = pairs.select(pairs.other < len(radius))", "pass"),
+        ("touch = TOUCHING * float(np.diff(np.sort(sizes)).min())", "touch = float(np.diff(np.sort(sizes)).min())"),
+        ("change &= gain >= rival", "pass"),
+        ("if exchanged.mean() > MOST or not usual < HARD * touch:", "if exchanged.mean() > MOST:"),
+        ("if exchanged.mean() > MOST or not usual < HARD * touch:", "if not usual < HARD * touch:"),
+    ),
 ]

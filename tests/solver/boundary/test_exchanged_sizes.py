@@ -87,3 +87,47 @@ def test_a_loose_grain_in_a_hole_is_greater_only_if_it_touches_three_and_fits(ne
     found = find_exchanged_sizes(position, radius, np.append(0, np.ones(neighbours + 4, np.int64)))
     assert (found[0] == large) == grows
     assert (found[1:] == large).all()
+
+
+def row_in_box(stated: list[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Centres (f, n, 2) of a row of grains of radius 8 mm that touch a floor, their stated radii, heights (f, n, 1)."""
+    x = 0.016 * np.arange(len(stated))
+    position = np.repeat(np.stack([x, np.full(len(x), 0.008)], axis=1)[None], 2, axis=0)
+    return position, np.array(stated), position[..., 1:].copy()
+
+
+def test_a_wall_shows_a_grain_that_is_too_large_if_most_others_touch_it() -> None:
+    stated = [0.008] * 4 + [0.00816] + [0.008] * 4 + [0.0079] * 30
+    position, radius, height = row_in_box(stated)
+    classes = np.unique(radius, return_inverse=True)[1]
+    position[:, 4, 0] += 0.5  # far from the others: the wall alone shows its size
+    position[:, 9:, 1] += 0.5 * np.arange(1, 31)
+    height[:, 9:] += 0.5
+    assert np.array_equal(find_exchanged_sizes(position, radius, classes), radius)
+    found = find_exchanged_sizes(position, radius, classes, height)
+    assert found.tolist() == [0.008] * 9 + [0.0079] * 30
+    assert np.array_equal(find_exchanged_sizes(position, radius, classes, height - 1e-4), radius)  # a displaced wall
+
+
+def test_of_sizes_that_are_as_good_the_nearest_one_is_used() -> None:
+    """A loose grain inside its neighbours: all lesser sizes touch nothing."""
+    angle = np.arange(6) * np.pi / 3.0
+    ring = 0.0195 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    position = np.repeat(np.concatenate([[[0.0, 0.0]], ring, ring + 0.3, ring + 0.6])[None], 2, axis=0)
+    radius = np.array([0.0122] + [0.008] * 6 + [0.0116] * 3 + [0.007] * 9)
+    classes = np.unique(radius, return_inverse=True)[1]
+    assert find_exchanged_sizes(position, radius, classes)[0] == 0.0116
+
+
+def test_a_loose_grain_gets_its_size_back_once_its_neighbours_have_theirs() -> None:
+    """A grain of 11 mm, stated 2 % larger, in a hole of six of 8 mm that are stated 2 % larger, too."""
+    angle = np.arange(6) * np.pi / 3.0
+    out, across = np.stack([np.cos(angle), np.sin(angle)], axis=1), np.stack([-np.sin(angle), np.cos(angle)], axis=1)
+    ring = 0.01906 * out
+    anchors = [ring + 0.016 * (np.cos(0.6) * out + sign * np.sin(0.6) * across) for sign in (-1.0, 1.0)]
+    loose = np.stack([np.arange(30) * 0.1, np.full(30, 1.0)], axis=1)
+    position = np.repeat(np.concatenate([[[0.0, 0.0]], ring, *anchors, loose])[None], 2, axis=0)
+    radius = np.array([0.01122] + [0.00816] * 6 + [0.008] * 12 + [0.007] * 15 + [0.011] * 15)
+    found = find_exchanged_sizes(position, radius, np.unique(radius, return_inverse=True)[1])
+    assert found[:7].tolist() == [0.011] + [0.008] * 6
+    assert np.array_equal(found[7:], radius[7:])

@@ -105,6 +105,7 @@ def test_true_corrections_restore_the_true_gaps(true, rng):
     np.testing.assert_allclose(equations.measure(rows, unknowns).gap, expected, atol=second_order)
 
 
+@pytest.mark.unit
 def test_derivatives_match_finite_differences(true, rng):
     classes = rng.integers(0, 2, true.grain_count)
     equations = GapEquations(true, classes)
