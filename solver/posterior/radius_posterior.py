@@ -10,11 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ..bodies.grains import Array
 from ..bodies.motion import Snapshot
 from ..bodies.packing import Packing
+from ..calibration.weights import NORMAL_MEDIAN
 from .posterior_settings import PosteriorSettings
 from .sampler.chain import ChainMeans, make_sampler_grains, make_sampler_pairs, make_schedule, run_chain
 from .sampler.records import SamplerGrains, SamplerPairs
@@ -25,6 +26,9 @@ MIN_RADIUS_SD = 0.5  # of the radii, over that of the centres or the noise; belo
 GAP_LAW_FRACTION = 0.3  # b over the noise: larger than for forces, so that radii mix
 ANNEALING = 600
 KEPT = 400
+FEWEST = 5  # grains of a size whose errors are compared
+COMMON, APART = 3.0, 6.0  # standard deviations, of `share_errors`
+LEAST_SHOWN = 0.3  # of a correction: less of it is the prior alone
 RADIUS_COVERAGE_FACTOR = 3.0  # true over sampled standard deviation: a single-site sampler underestimates it
 
 
@@ -90,6 +94,54 @@ def estimate_radii(
     sd = max(sd, diameter * float(np.sqrt(square.mean())))
     correction_sd = np.minimum(RADIUS_COVERAGE_FACTOR * sampled, sd)
     return RadiusPosterior(shared + diameter * mean, correction_sd, sd, evidence.corrected)
+
+
+def share_errors(found: RadiusPosterior, size_class: Int[np.ndarray, " n"]) -> RadiusPosterior:
+    """Estimate the errors again where grains of one stated size have an error in common.
+
+    Parameters
+    ----------
+    found : RadiusPosterior
+        By `estimate_radii`, whose prior knows no sizes.
+    size_class : (n,)
+        Stated size of each grain, from 0.
+
+    Returns
+    -------
+    RadiusPosterior
+        As given where no size has a common error: the true radii may then differ from the stated sizes one by one.
+
+    Notes
+    -----
+    Empirical Bayes (C. N. Morris, J. Am. Stat. Assoc. 78, 47 (1983)) for every size of at least FEWEST grains. A
+    correction c of standard deviation s is the part ρ = 1 − s²/σ_r² of what gaps and balance show: x = c/ρ, of variance
+    v = s²/ρ. With the median m of x, its robust variance w² = ⟨(x − m)²⟩ and that of true errors τ² = max(w² − v, 0),
+
+        c = m + k (x − m),  s² = k v + (1 − k)² w²/n,  k = τ²/(τ² + v).
+
+    An error is common where |m| > COMMON w. Grains with |x − m| > APART √(τ² + v) have an error of their own and stay.
+    """
+    if not found.prior_sd > 0.0 or not len(size_class):
+        return found
+    correction, sd = found.correction.copy(), found.correction_sd.copy()
+    shown = np.maximum(1.0 - (sd / found.prior_sd) ** 2, LEAST_SHOWN)
+    value, variance = correction / shown, sd**2 / shown
+    common = False
+    for each in range(int(size_class.max()) + 1):
+        rows = np.flatnonzero((size_class == each) & (variance > 0.0))
+        if len(rows) < FEWEST:
+            continue
+        x, v = value[rows], variance[rows]
+        mean = float(np.median(x))
+        width = float((np.median(np.abs(x - mean)) / NORMAL_MEDIAN) ** 2)
+        common |= abs(mean) > COMMON * np.sqrt(width)
+        true = max(width - float(np.median(v)), 0.0)
+        kept = true / (true + v)
+        alike = np.abs(x - mean) <= APART * np.sqrt(true + v)
+        shared = np.sqrt(kept * v + (1.0 - kept) ** 2 * width / len(rows))
+        correction[rows] = np.where(alike, mean + kept * (x - mean), correction[rows])
+        sd[rows] = np.where(alike, shared, sd[rows])
+    return replace(found, correction=correction, correction_sd=sd) if common else found
 
 
 def _is_detectable(evidence: SequenceEvidence) -> bool:

@@ -21,7 +21,7 @@ from ...solver.boundary.size_classes import find_size_classes
 from ...solver.calibration.calibrate import Calibration
 from ...solver.contacts.contacts import detect_contacts
 from ...solver.part_settings import CalibrationSettings
-from ...solver.posterior.radius_posterior import RadiusPosterior, estimate_radii, has_radius_errors
+from ...solver.posterior.radius_posterior import RadiusPosterior, estimate_radii, has_radius_errors, share_errors
 from ...tracks import Tracks, WallTracks
 from ..snapshots import make_snapshots, measure_sequence
 from .calibration import calibrate_tracks, radius_classes
@@ -101,6 +101,9 @@ def calibrate_with_radii(
         return calibrated
     shared = _correct_shared(first, tracks, walls)
     found = estimate_radii(*_seen(material, *shared, failed), np.random.default_rng(SEED))
+    classes = radius_classes(tracks.radius)
+    if classes is not None:
+        found = share_errors(found, classes)
     better = replace(tracks, radius=tracks.radius + found.correction)
     remaining = float(np.sqrt(np.mean(found.correction_sd**2)))
     tracks, walls, then = calibrate_tracks(settings, better, walls, typical_overlap, failed, remaining)

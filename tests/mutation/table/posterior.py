@@ -169,5 +169,11 @@ MUTANTS = [
         ("stacked._replace(radius_sd=grains[0].radius_sd)", "stacked"),
         ("shared + diameter * mean, correction_sd", "shared - diameter * mean, correction_sd"),
         ("np.maximum(square - mean**2, 0.0)", "square"),
+        ("common |= abs(mean) > COMMON * np.sqrt(width)", "common = True"),
+        ("<= APART * np.sqrt(true + v)", "<= 99.0"),
+        ("if len(rows) < FEWEST:", "if not len(rows):"),
+        ("true = max(width - float(np.median(v)), 0.0)", "true = 0.0"),
+        ("value, variance = correction / shown, sd**2 / shown", "value, variance = correction, sd**2"),
+        ("kept * v + (1.0 - kept) ** 2 * width / len(rows)", "kept * v"),
     ),
 ]

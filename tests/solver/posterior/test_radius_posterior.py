@@ -1,7 +1,12 @@
 import numpy as np
 import pytest
 from rodsight.solver.posterior import radius_posterior
-from rodsight.solver.posterior.radius_posterior import RADIUS_COVERAGE_FACTOR, estimate_radii
+from rodsight.solver.posterior.radius_posterior import (
+    RADIUS_COVERAGE_FACTOR,
+    RadiusPosterior,
+    estimate_radii,
+    share_errors,
+)
 from rodsight.solver.posterior.sampler.chain import ChainMeans
 
 from tests.solver.posterior.simulated import NOISE, simulate_shear
@@ -52,3 +57,45 @@ def test_radius_errors_of_one_per_cent_are_found_from_all_frames() -> None:
     assert found.prior_sd == pytest.approx(error.std(), rel=0.35)
     assert np.median(np.abs(left)) < 0.15 * np.median(np.abs(error))
     assert np.mean(np.abs(left) < 2.0 * found.correction_sd) > 0.85
+
+
+def posterior(correction: np.ndarray, sd: float, prior: float) -> RadiusPosterior:
+    return RadiusPosterior(correction, np.full(len(correction), sd), prior, False)
+
+
+def test_an_error_that_all_grains_of_a_size_have_is_shared() -> None:
+    rng, prior, noise = np.random.default_rng(1), 1e-4, 2e-5
+    sizes = np.repeat([0, 1, 2], [60, 40, 4])
+    true = np.where(sizes == 1, -1.6e-4, 0.0)
+    true[5] = 4e-4  # an error of its own
+    shown = 1.0 / (1.0 + (noise / prior) ** 2)
+    sd = noise * np.sqrt(shown)
+    given = posterior(shown * (true + noise * rng.standard_normal(len(true))), sd, prior)
+    found = share_errors(given, sizes)
+    few, own = sizes == 2, np.arange(len(true)) == 5
+    assert np.array_equal(found.correction[few | own], given.correction[few | own])
+    assert np.array_equal(found.correction_sd[few | own], given.correction_sd[few | own])
+    error, before = (found.correction - true)[~few & ~own], (given.correction - true)[~few & ~own]
+    assert error.std() < 0.4 * before.std()
+    assert np.abs(error.mean()) < 0.2 * noise
+    stated = np.sqrt(np.mean(found.correction_sd[~few & ~own] ** 2))
+    assert 0.1 * stated < np.sqrt(np.mean(error**2)) < 2.0 * stated < noise
+
+
+def test_true_differences_within_a_size_stay_beside_a_common_error() -> None:
+    rng, prior, noise = np.random.default_rng(2), 1e-4, 1e-5
+    true = -4e-4 + 5e-5 * rng.standard_normal(400)
+    shown = 1.0 / (1.0 + (noise / prior) ** 2)
+    given = posterior(shown * (true + noise * rng.standard_normal(400)), noise * np.sqrt(shown), prior)
+    found = share_errors(given, np.zeros(400, np.int64))
+    assert np.corrcoef(found.correction, true)[0, 1] > 0.95
+    assert found.correction_sd.mean() == pytest.approx(noise, rel=0.1)
+
+
+@pytest.mark.parametrize("spread", [0.0, 5e-5])
+def test_without_a_common_error_all_corrections_stay(spread) -> None:
+    rng = np.random.default_rng(3)
+    given = posterior(rng.normal(1e-5, 2e-5 + spread, 100), 2e-5, 1e-4)
+    assert share_errors(given, np.repeat([0, 1], 50)) is given
+    exact = posterior(np.zeros(100), 0.0, 0.0)
+    assert share_errors(exact, np.zeros(100, np.int64)) is exact
