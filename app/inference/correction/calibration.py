@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...solver.bodies.grains import Array
 from ...solver.calibration.calibrate import EXCESSIVE_NOISE, Calibration, calibrate, default_priors
 from ...solver.part_settings import CalibrationSettings
+from ...solver.posterior.radius_posterior import FEWEST
 from ...tracks import Tracks, WallTracks, held_once
 from ..snapshots import measure_sequence
 
@@ -83,12 +84,22 @@ def calibrate_tracks(
     return corrected, replace(walls, endpoints=better.endpoints), found
 
 
-def own_gap_error(found: Calibration) -> float:
-    """Compute the rms part of a gap [m] that was corrected as errors of centres and radii which not all grains share.
+def own_gap_error(found: Calibration, size_class: NDArray[np.int64] | None = None) -> float:
+    """Compute the rms part of a gap [m] that was corrected as errors of single grains.
 
     Where the grains hardly move against each other, such errors look like overlaps, which are corrected with them.
+
+    Parameters
+    ----------
+    found : Calibration
+    size_class : (n,), optional
+        Stated size of each grain, from 0: an error that FEWEST or more grains of a size share is none of a single one.
     """
     own = found.radius - np.median(found.radius)
+    if size_class is not None:
+        for rows in (size_class == each for each in np.unique(size_class)):
+            if rows.sum() >= FEWEST:
+                own[rows] = found.radius[rows] - np.median(found.radius[rows])
     return float(np.sqrt(2.0 * (np.mean(found.offset**2) + np.mean(own**2))))
 
 

@@ -16,7 +16,7 @@ from ..corrected_sequence import CorrectedSequence
 from ..inputs import Inputs
 from ..snapshots import make_snapshots
 from .boundary import correct_camera, correct_walls, measure_noise
-from .calibration import calibrate_tracks, known_radii, own_gap_error
+from .calibration import calibrate_tracks, known_radii, own_gap_error, radius_classes
 from .close_photographs import choose_span, count_alike
 from .friction import measure_friction, measure_resisting, refine_wall_friction, tuned_radii, use_unstated
 from .outliers import remove_outliers, restore_exchanged_ids
@@ -87,7 +87,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         else:
             tracks, walls, calibration = calibrate_tracks(*observed)
         if calibration is not None:
-            corrected_gap = own_gap_error(calibration)
+            corrected_gap = own_gap_error(calibration, radius_classes(given.radius))
             settings = replace(settings, sequence=replace(settings.sequence, corrected_gap=corrected_gap))
     if not nothing_seen:  # calibration has measured the noise that hides the sliding
         span, remarks[4] = choose_span(tracks)

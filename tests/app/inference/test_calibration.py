@@ -184,3 +184,8 @@ def test_errors_of_single_rods_make_the_corrected_part_of_a_gap() -> None:
     offset, radius = rng.normal(0.0, 4e-5, (n, 2)), rng.normal(0.0, 3e-5, n)
     own = own_gap_error(replace(alike, offset=offset, radius=alike.radius + radius))
     assert own == pytest.approx(2.0**0.5 * 5e-5, rel=0.2)
+    sizes = np.where(np.arange(n) % 3 == 1, 1, 0)
+    of_one = replace(alike, radius=np.where(sizes == 1, -1.6e-4, 0.0))
+    sizes[:2] = 2  # too few rods of one size
+    assert own_gap_error(of_one) > 1e-4
+    assert own_gap_error(of_one, sizes) == pytest.approx(np.sqrt(2.0 / n) * 1.6e-4)  # of the one that is alone
