@@ -14,7 +14,6 @@ from scipy.spatial import KDTree
 
 from ..bodies.grains import Array
 
-MOST_FRAMES = 6  # that are read, evenly over the sequence
 TOUCHING = 0.25  # of the least difference of two sizes: greatest gap or overlap of a touching pair
 INSIDE = 3.0  # touching neighbours that outweigh one inside which the grain lies
 # Touching neighbours per photograph by which a lesser and a greater size must be better: a loose grain touches none,
@@ -30,7 +29,7 @@ MOST = 0.3  # fraction of the grains: if more seem exchanged, something else is 
 
 @dataclass(frozen=True, slots=True)
 class _Pairs:
-    """Candidate pairs (m,) of all photographs that are read, those of grains in both orders."""
+    """Candidate pairs (m,) of all photographs, those of grains in both orders."""
 
     grain: NDArray[np.int64]
     other: NDArray[np.int64]  # a grain, or number of grains + a wall, whose radius is zero
@@ -76,8 +75,8 @@ def find_exchanged_sizes(
     touch = TOUCHING * float(np.diff(np.sort(sizes)).min())
     reach = float(sizes.max()) + touch
     from_walls = np.empty((*position.shape[:2], 0)) if from_walls is None else from_walls
-    pairs, frames = _candidate_pairs(position, from_walls, float(sizes.max()) + reach, reach)
-    pairs = _at_known_walls(pairs, radius, touch)
+    pairs = _candidate_pairs(position, from_walls, float(sizes.max()) + reach, reach)
+    pairs, frames = _at_known_walls(pairs, radius, touch), len(position)
     found, of_walls = radius.copy(), np.zeros(from_walls.shape[2])
     for _ in range(ROUNDS):
         others = np.append(found, of_walls)
@@ -122,12 +121,11 @@ def _at_known_walls(pairs: _Pairs, radius: Array, touch: float) -> _Pairs:
     return pairs.select(~at_wall | known[pairs.other])
 
 
-def _candidate_pairs(position: Array, from_walls: Array, reach: float, at_walls: float) -> tuple[_Pairs, int]:
-    """List the pairs nearer than `reach`, or `at_walls` [m], and the number of photographs that were read."""
-    read = np.unique(np.linspace(0, len(position) - 1, min(len(position), MOST_FRAMES)).round().astype(np.int64))
+def _candidate_pairs(position: Array, from_walls: Array, reach: float, at_walls: float) -> _Pairs:
+    """List the pairs nearer than `reach`, or `at_walls` [m], in any photograph."""
     grains = position.shape[1]
     first, second, apart = [], [], []
-    for place, depth in zip(position[read], from_walls[read], strict=True):
+    for place, depth in zip(position, from_walls, strict=True):
         here = np.flatnonzero(np.isfinite(place[:, 0]))
         if not len(here):
             continue
@@ -139,8 +137,8 @@ def _candidate_pairs(position: Array, from_walls: Array, reach: float, at_walls:
         apart += [distance, distance, depth[grain, wall]]
     if not apart:
         nothing = np.empty(0, np.int64)
-        return _Pairs(nothing, nothing, np.empty(0)), len(read)
-    return _Pairs(np.concatenate(first), np.concatenate(second), np.concatenate(apart)), len(read)
+        return _Pairs(nothing, nothing, np.empty(0))
+    return _Pairs(np.concatenate(first), np.concatenate(second), np.concatenate(apart))
 
 
 def _score(pairs: _Pairs, own: Array, others: Array, touch: float) -> Array:

@@ -150,7 +150,9 @@ class GapEquations:
         self._distortion = radial_distortion(sequence)
 
     def thinned(self, count: int) -> GapEquations:
-        """Select at most `count` frames, evenly spaced; the unknowns keep their meaning."""
+        """Select at most `count` frames, evenly spaced; the unknowns keep their meaning. With no more: itself."""
+        if self.sequence.frame_count <= count:
+            return self
         found, k = copy(self), self.sequence.spread_frames(count)
         found.sequence = self.sequence.thinned(count)
         found._cosine, found._sine, found._distortion = self._cosine[k], self._sine[k], self._distortion[k]

@@ -7,9 +7,9 @@ deviation of a gap by noise and overlap, β(s) the bias of the weights and σ_u 
 
     min_u Σ p (g(u_0) + A (u − u_0) + ō + β)² + Σ u²/σ_u²,   p = W((g(u_0) + ō)/s)/max(σ², 0.3 s²),
 
-with W by `weigh_gaps`. In the nine annealing rounds k = 0 … 8, s = s_0^(1 − k/9) (2 σ)^(k/9), where s_0 is the
-standard deviation of a gap by the prior errors. In six more, s = 2 σ, and after each the noise and the priors are
-updated (`priors`).
+with W by `weigh_gaps`. In the nine annealing rounds k = 0 … 8, which read at most sixteen photographs, s = s_0^(1 −
+k/9) (2 σ)^(k/9), where s_0 is the standard deviation of a gap by the prior errors. In six more, s = 2 σ, and after each
+the noise and the priors are updated (`priors`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from ..bodies.grains import Array
 from .equations import GapEquations
 from .gap_error_draws import GapErrorDraws
-from .gaps import GapRows
 from .normal_equations import Couplings, NormalEquations
 from .priors import CalibrationPairs, CalibrationPriors, find_calibration_pairs, prior_vector, reduce_priors
 from .weights import FINAL_SCALE, weigh_gaps, weighting_bias
@@ -85,11 +84,12 @@ def fit_gaps(
     The equations of a round stand in the module's docstring. Standard deviations are 1.2 times the rms of the draws of
     `_LinearStep.draw`, at most the prior's.
     """
-    unknowns = _anneal(equations.thinned(ANNEALING_FRAMES), priors, overlap)
-    candidates = find_calibration_pairs(equations.sequence, priors, overlap)
+    few = equations.thinned(ANNEALING_FRAMES)
+    pairs = _find_pairs(few, priors, overlap)
+    unknowns = _anneal(few, *pairs, priors)
+    candidates, couplings = pairs if few is equations else _find_pairs(equations, priors, overlap)
     rows, limits = candidates.rows, priors
     before = equations.measure(rows, np.zeros_like(unknowns)).gap
-    couplings = _couplings(equations, rows)
     step = _LinearStep(equations, candidates, couplings, unknowns, FINAL_SCALE * candidates.noise, priors)
     for _ in range(REFINING_ROUNDS - 1):
         unknowns = step.solution()
@@ -104,21 +104,25 @@ def fit_gaps(
     return GapFit(unknowns, sd, step.gap_rms(draws), priors, candidates, before, after, step.touching)
 
 
-def _anneal(equations: GapEquations, priors: CalibrationPriors, overlap: float) -> Array:
+def _find_pairs(
+    equations: GapEquations, priors: CalibrationPriors, overlap: float
+) -> tuple[CalibrationPairs, Couplings]:
+    """Find the candidate pairs, and the pattern of their normal equations."""
+    candidates, n = find_calibration_pairs(equations.sequence, priors, overlap), equations.sequence.grain_count
+    return candidates, Couplings.of(n, candidates.rows.i, candidates.rows.second_grain(n))
+
+
+def _anneal(
+    equations: GapEquations, candidates: CalibrationPairs, couplings: Couplings, priors: CalibrationPriors
+) -> Array:
     """Approach the solution (u,) while the scale of the weights goes from that of the errors to that of the noise."""
-    candidates = find_calibration_pairs(equations.sequence, priors, overlap)
-    couplings, unknowns = _couplings(equations, candidates.rows), np.zeros(equations.layout.count)
+    unknowns = np.zeros(equations.layout.count)
     end = FINAL_SCALE * candidates.noise
     for number in range(ANNEALING_ROUNDS):
         annealed = number / ANNEALING_ROUNDS
         s = np.maximum(candidates.scale ** (1.0 - annealed) * end**annealed, end)
         unknowns = _LinearStep(equations, candidates, couplings, unknowns, s, priors).solution()
     return unknowns
-
-
-def _couplings(equations: GapEquations, rows: GapRows) -> Couplings:
-    n = equations.sequence.grain_count
-    return Couplings.of(n, rows.i, rows.second_grain(n))
 
 
 class _LinearStep:

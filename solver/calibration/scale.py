@@ -30,6 +30,7 @@ from ..bodies.grains import Array
 from ..bodies.wall_shapes import OUT, STRAIGHT, Sides, all_sides, bounding_distance, circle_ends, circle_parameters
 from .gaps import MeasuredSequence, find_gap_rows, measure_gaps
 from .priors import CalibrationPriors
+from .weights import NORMAL_MEDIAN
 
 REACH = 0.06  # of a mean diameter: greatest gap that is used
 COARSE = 1.5e-3  # of a mean diameter: initial kernel width, then reduced to the width of the peak
@@ -39,7 +40,6 @@ MIN_PAIRS = 6  # distinct pairs in a peak; classes with fewer are not used
 FRAMES = 20  # photographs used, evenly spaced
 OVERLAP_SD = 0.5  # relative standard deviation of the typical overlap
 TAIL_SD = 0.1  # standard deviation of the peak's shift by the tail of open gaps, over the peak's width
-NORMAL_MEDIAN = 0.6745  # median of |N(0, 1)|
 SIGNIFICANT_SDS = 3.0  # standard deviations above which an error is significant
 MIN_LIKELIHOOD_GAIN = 20.0  # gain in twice the log posterior above which the given scale is corrected
 REWEIGHTINGS = 60  # rounds for the Laplace priors

@@ -10,6 +10,7 @@ from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.bodies.interpolation import interpolate_ignored_frames
 from ...solver.bodies.motion import Snapshot
@@ -50,8 +51,9 @@ def correct_exchanged_sizes(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, 
     classes = radius_classes(tracks.radius) if tracks.grain_count else None
     if classes is None:
         return tracks, ""
-    position = np.where(tracks.present[..., None], tracks.position, np.nan)
-    place, ends, side = position[:, :, None], walls.endpoints[:, None], walls.sides
+    read = _frames_read(tracks)
+    position = np.where(tracks.present[read, :, None], tracks.position[read], np.nan)
+    place, ends, side = position[:, :, None], walls.endpoints[read, None], walls.sides
     margin = np.broadcast_to(tracks.radius[:, None], (tracks.grain_count, walls.count))
     beside = beside_wall(ends, side, place, margin)
     from_walls = np.where(beside, distance_from_walls(ends, side, place), np.nan)
@@ -187,6 +189,12 @@ def find_wrong_sizes(tracks: Tracks, walls: WallTracks | None, failed: Collectio
     return {r: each for r, each in overlap.items() if each > SEEN and mean.min() < UNEQUAL * 2.0 * r * each}
 
 
+def _frames_read(tracks: Tracks) -> NDArray[np.int64]:
+    """Choose at most READ photographs, evenly spaced."""
+    count = tracks.frame_count
+    return np.unique(np.linspace(0, count - 1, min(count, READ)).round().astype(np.int64))
+
+
 def find_oversized_rods(tracks: Tracks) -> dict[int, float]:
     """Find rods that lie inside their neighbours, as where a row of the table of radii is that of another rod.
 
@@ -201,9 +209,9 @@ def find_oversized_rods(tracks: Tracks) -> dict[int, float]:
     and show both; no rod is so soft. Of their rods that with the most such pairs is wrong, then of the rest.
     """
     grains = RodMaterial().pack(tracks.radius, np.empty(0)).grains
-    read = np.unique(np.linspace(0, tracks.frame_count - 1, min(tracks.frame_count, READ)).round().astype(int)).tolist()
+    read = _frames_read(tracks)
     deep: dict[tuple[int, int], list[float]] = {}
-    for k in read:
+    for k in read.tolist():
         near = detect_contacts(grains, tracks.position[k], tracks.present_in(k), walls_in(None, k), 0.0)
         depth = -near.gap / np.minimum(tracks.radius[near.i], tracks.radius[near.j])
         for row in np.flatnonzero(depth > DEEP).tolist():
