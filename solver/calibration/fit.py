@@ -7,9 +7,9 @@ deviation of a gap by noise and overlap, β(s) the bias of the weights and σ_u 
 
     min_u Σ p (g(u_0) + A (u − u_0) + ō + β)² + Σ u²/σ_u²,   p = W((g(u_0) + ō)/s)/max(σ², 0.3 s²),
 
-with W by `weigh_gaps`. In the nine annealing rounds k = 0 … 8, which read at most sixteen photographs, s = s_0^(1 −
-k/9) (2 σ)^(k/9), where s_0 is the standard deviation of a gap by the prior errors. In six more, s = 2 σ, and after each
-the noise and the priors are updated (`priors`).
+with W by `weigh_gaps`. In the nine annealing rounds k = 0 … 8, which read at most sixteen photographs,
+s = s_0^(1 − k/9) (2 σ)^(k/9), where s_0 is the standard deviation of a gap by the prior errors. In six more, s = 2 σ,
+and after each the noise and the priors are updated (`priors`).
 """
 
 from __future__ import annotations
