@@ -81,7 +81,7 @@ def test_an_error_in_the_table_is_named_before_any_run(text, named, table, tmp_p
     assert not (tmp_path / "all").exists()
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_all_runs_are_collected_in_joint_tables(done):
     folder, cases, outcomes = done
     rows = collect(folder, cases, outcomes)

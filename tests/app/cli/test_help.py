@@ -83,7 +83,7 @@ main()
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() == "[]"
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_workbench_starts_without_what_only_shows_recordings_or_exports():
     code = "import sys, rodsight.workbench.service.server, rodsight.workbench.command; print(sys.modules.keys() & {%s})"
     heavy = ", ".join(f"'{name}'" for name in ("rerun", "pandas", "matplotlib", "vtk"))

@@ -62,7 +62,7 @@ def test_results_of_the_same_code_are_used_again(out, made_tracks, capsys):
     assert "computed anew" not in capsys.readouterr().out
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_results_of_other_code_are_solved_anew_and_one_line_states_why(out, made_tracks, monkeypatch, capsys):
     before = created(out)
     other_code(monkeypatch)
@@ -73,7 +73,7 @@ def test_results_of_other_code_are_solved_anew_and_one_line_states_why(out, made
     assert created(out).startswith("other ")
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_results_of_another_library_are_solved_anew_and_a_line_names_both(out, made_tracks, monkeypatch, capsys):
     stated = run_folder.library_versions()
     monkeypatch.setattr(run_folder, "library_versions", lambda: stated | {"numpy": "99.0"})

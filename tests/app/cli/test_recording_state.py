@@ -56,6 +56,7 @@ def test_a_recording_of_earlier_results_is_out_of_date_and_its_results_are_not(s
     assert recording_out_of_date(solved_again) == []
 
 
+@pytest.mark.slow
 def test_the_summary_is_that_of_the_results_whichever_command_solved_them(root):
     folder = root / "runs" / "tracked"
     before = json.loads((folder / "summary.json").read_text())["loads"]
@@ -87,6 +88,7 @@ def test_results_of_a_version_that_stored_no_input_are_out_of_date(root):
     assert "earlier version" in reason
 
 
+@pytest.mark.slow
 def test_commands_that_read_results_print_it(root, capsys):
     folder = root / "runs" / "tracked"
     pressure(root)
@@ -140,6 +142,7 @@ def test_a_whole_folder_that_was_moved_and_edited_keeps_its_run(root, tmp_path):
     assert out_of_date(moved / "runs" / "tracked") == [PRESSURE]
 
 
+@pytest.mark.slow
 def test_results_alone_use_no_experiment_that_happens_to_be_in_the_current_folder(
     root, neighbour, tmp_path, monkeypatch, capsys
 ):

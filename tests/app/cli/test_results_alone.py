@@ -52,7 +52,7 @@ def test_it_is_recorded_without_photographs(sent, capsys):
     assert "--out" in capsys.readouterr().err
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["tables", "vtk", "graph", "figures"])
 def test_it_is_exported(sent, what):
     options = ("--formats", "png") if what == "figures" else ()
@@ -67,7 +67,7 @@ def test_it_is_compared_and_opened(sent, tmp_path):
     assert len(product.open(file).contacts(frame=1))
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 @pytest.mark.parametrize("version", [1, 2])
 def test_files_of_earlier_schemas_stand_alone_too(tmp_path, version):
     file = unpack(version, tmp_path)

@@ -75,7 +75,7 @@ def test_the_results_file_has_the_public_layout(tracked, tmp_path, capsys):
         assert "friction = 0.25" in store.attrs["configuration"]
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_results_read_back_as_they_were_stored(tracked, tmp_path, capsys):
     from rodsight.results.checkpoint import flatten
     from rodsight.results.hdf5.store import Provenance, save_results
@@ -96,7 +96,7 @@ def test_results_read_back_as_they_were_stored(tracked, tmp_path, capsys):
             assert equal, name
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_same_command_finds_everything_done(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("run", str(tracked), "--out", str(out), *FEW) == 0
@@ -189,6 +189,7 @@ def test_scoring_the_truth_against_itself_is_perfect(tracked, tmp_path, capsys):
     assert found["contact_recall"] == [1.0] * 5
 
 
+@pytest.mark.slow
 def test_check_describes_the_input_and_writes_nothing(tracked, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert rodsight("check", str(tracked)) == 0

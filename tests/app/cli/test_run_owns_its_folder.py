@@ -191,7 +191,7 @@ def test_a_verdict_given_during_a_run_is_used_by_the_next_run_only(tracked, tmp_
     assert load_results(out / "results.h5").frames[3].status.name == "RESET"
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_partial_files_of_a_stopped_run_are_removed_and_no_others(tracked, tmp_path):
     out = tmp_path / "out"
     (out / ".unfinished" / "solving").mkdir(parents=True)

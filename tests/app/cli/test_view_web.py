@@ -10,7 +10,7 @@ import pytest
 from tests.app.recording.fake_results import make_results
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_page_is_there_until_ctrl_c_and_a_second_call_takes_another_port(tmp_path):
     from rodsight.recording.files.finished_run import write_recording
 

@@ -11,7 +11,7 @@ from rodsight.results.hdf5.store import Provenance, save_results
 from tests.app.results.full_results import make_full_results
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_tree_equals_that_of_the_file(tmp_path):
     results = make_full_results()
     save_results(tmp_path / "results.h5", results, Provenance("", "experiment.toml", (0, None), {}))

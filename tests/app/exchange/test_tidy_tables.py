@@ -63,7 +63,7 @@ def test_recorded_and_inferred_wall_forces_have_different_columns():
     assert walls.column("wall").to_pylist()[:4] == list(results.walls.name)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_command_writes_beside_the_results(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     for arguments in (

@@ -21,7 +21,7 @@ def y_down(file: Path) -> None:
     change(file, y1=lambda y: 0.3 - y, y2=lambda y: 0.3 - y)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 @pytest.mark.parametrize("mistake", [reverse, y_down])
 def test_wrong_walls_of_photographs_are_refused(photographed, capsys, mistake):
     mistake(photographed / "walls.csv")

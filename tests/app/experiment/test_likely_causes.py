@@ -59,7 +59,7 @@ def test_a_mistake_is_refused_with_its_likely_cause(tracked, capsys, cause):
     assert cause in message
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_very_small_pressure_gives_a_warning(tracked, capsys):
     edit(tracked / "experiment.toml", "pressure = 50000.0", "pressure = 50")
     assert rodsight("check", tracked) == 0
@@ -72,7 +72,7 @@ def test_a_density_that_may_be_in_other_units_gives_a_warning(tracked, capsys, d
     assert (f"if it is in g/cm³, write density = {1e3 * density:g}" in capsys.readouterr().out) == warns
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_an_open_side_is_reported_with_the_walls_beside_it(tracked, capsys):
     edit(tracked / "experiment.toml", 'truth = "truth_contacts.csv"', "")  # the truth refers to the wall
     file = tracked / "walls.csv"

@@ -35,6 +35,7 @@ def test_fringes_that_are_not_there_are_not_drawn(results):
         draw_figure(replace(results, fringes=None), "fringes")
 
 
+@pytest.mark.slow
 def test_every_figure_has_the_width_of_a_column_and_units(results):
     truth = make_truth(results, np.random.default_rng(0))
     before = dict(matplotlib.rcParams)

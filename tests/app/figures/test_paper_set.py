@@ -39,7 +39,7 @@ def truth(results) -> TruthContacts:
     return make_truth(results, np.random.default_rng(0))
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_all_four_figures_are_written(results, truth, tmp_path):
     files = write_paper_set(results, tmp_path / "paper", ("png",), truth=truth)
     assert [each.name for each in files] == ["apparatus.png", "zero_forces.png", "networks.png", "recorded.png"]

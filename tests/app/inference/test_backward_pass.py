@@ -53,6 +53,7 @@ def test_the_second_frame_improves_the_first_of_a_sheared_packing(sheared):
     assert after.unbalance < 0.05
 
 
+@pytest.mark.slow
 def test_a_fresh_packing_keeps_its_own_forces(tmp_path):
     fresh = solve(tmp_path, "shear", 6, grains=100, frames=2)
     assert FUSED not in fresh.complete().frames[0].reason

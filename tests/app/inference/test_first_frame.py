@@ -29,7 +29,7 @@ def wrong_centres(tmp_path_factory: pytest.TempPathFactory) -> Solved:
     return solve(tmp_path_factory.mktemp("scenario"), "centres", 5, grains=RODS)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_later_frames_improve_the_first_and_its_reason_states_so(wrong_centres):
     results = wrong_centres.complete()
     before, after, true = wrong_centres.frames[0], results.frames[0], wrong_centres.true[0]
@@ -47,7 +47,7 @@ def test_the_scale_of_the_first_is_less_certain_than_that_of_the_second(wrong_ce
     assert first.scale_sd > max(second.scale_sd, FIRST_SCALE)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_other_frames_stay_as_they_are(wrong_centres):
     results = wrong_centres.complete()
     for one, other in zip(wrong_centres.frames[1:], results.frames[1:], strict=True):

@@ -45,7 +45,7 @@ def contradicted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Inputs, Resu
     return inputs, infer_sequence(inputs)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_variation_without_effect_has_the_trust_of_the_run(contradicted):
     inputs, results = contradicted
     assert results.friction_check is not None
@@ -57,7 +57,7 @@ def test_a_variation_without_effect_has_the_trust_of_the_run(contradicted):
     assert effect.trust == pytest.approx(float(late.mean()), abs=0.005)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_friction_check_widens_the_intervals_of_every_frame(contradicted):
     inputs, results = contradicted
     unchecked = infer_sequence(inputs, complete=False)
@@ -67,6 +67,7 @@ def test_the_friction_check_widens_the_intervals_of_every_frame(contradicted):
         assert (after.fn_sd >= before.fn_sd).all()
 
 
+@pytest.mark.slow
 def test_every_frame_of_smoothed_tracks_is_trusted_less(contradicted):
     inputs, as_measured = contradicted
     assert max(each.trust for each in as_measured.frames) > TRUST_OF_SMOOTHED + 0.2
@@ -110,7 +111,7 @@ def test_an_interrupted_sequence_continues_bit_for_bit(contradicted):
         assert one.trust == other.trust
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_an_interrupted_sequence_of_close_photographs_continues_bit_for_bit(contradicted, monkeypatch):
     inputs, neighbours = contradicted
     monkeypatch.setattr(correct_module, "choose_span", lambda tracks: (3, "read over 3 photographs"))
@@ -138,7 +139,7 @@ def test_noise_that_hides_sliding_is_the_one_that_the_calibration_measured(contr
     assert seen[0] >= 3.0 * inputs.tracks.sigma.max()
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_first_frame_that_cannot_be_estimated_stays_and_is_reported(contradicted, monkeypatch):
     inputs, _ = contradicted
     store, failures = MemoryStore(), []
@@ -156,7 +157,7 @@ def test_a_first_frame_that_cannot_be_estimated_stays_and_is_reported(contradict
     np.testing.assert_array_equal(results.frames[0].fn, store.frames[0].forces.fn)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_observer_receives_every_frame_once_and_the_progress(contradicted, tmp_path: Path):
     inputs, _ = contradicted
     events: list[int] = []
@@ -189,7 +190,7 @@ def test_a_sequence_without_a_solved_frame_is_neither_estimated_nor_checked(cont
     assert results.friction_check is None
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_contacts_of_an_interpolated_rod_bear_force_and_are_marked(contradicted):
     inputs, results = contradicted
     frame, load = 4, np.bincount(results.frames[4].contacts.i, results.frames[4].fn)

@@ -33,7 +33,7 @@ def corrected(
     return correct_scenario(experiment), read_tracks(experiment).radius, made.truth.radius
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_wrong_radii_are_corrected_by_forces(tmp_path, monkeypatch):
     before = []
 

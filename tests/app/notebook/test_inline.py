@@ -34,7 +34,7 @@ def test_a_run_without_a_recording_is_refused():
         rodsight.Run(make_results(2)).view()
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_all_parts_of_a_recording_are_in_the_cell_unless_it_is_too_large(notebook, tmp_path, monkeypatch):
     written = write_recording(
         make_results(frame_count=4), tmp_path / "recording.rrd", options=RecordingOptions(part_frames=3)

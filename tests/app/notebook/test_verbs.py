@@ -60,7 +60,7 @@ def test_bad_input_is_an_input_error_with_one_line(made_tracks):
     assert issubclass(rodsight.RunError, Exception)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_check_gives_what_the_command_prints(made_tracks, capsys):
     found = rodsight.check(made_tracks)
     assert command("check", str(made_tracks), "--json") == 0

@@ -117,6 +117,7 @@ def test_undoing_every_verdict_gives_the_former_results(solved_by_default):
         assert np.array_equal(one.contacts.key, other.contacts.key)
 
 
+@pytest.mark.slow
 def test_flags_take_effect(solved):
     out, again = solved
     log = VerdictLog(out / VERDICTS)

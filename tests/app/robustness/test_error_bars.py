@@ -86,7 +86,7 @@ def test_an_ensemble_changes_the_error_bars_and_never_the_forces(made_tracks, tm
     capsys.readouterr()
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_stored_members_are_not_solved_again(nominal, tmp_path, monkeypatch):
     checkpoint = Checkpoint(tmp_path / "ensemble", "x")
     whole = solve_members(nominal.inputs, 2)

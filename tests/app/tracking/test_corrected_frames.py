@@ -68,6 +68,7 @@ def test_only_frames_from_the_changed_correction_on_are_tracked_again(
         assert getattr(again, name).tobytes() == getattr(fresh, name).tobytes()
 
 
+@pytest.mark.slow
 def test_other_photographs_are_tracked_from_the_first_on(
     photographed: Path, tmp_path: Path, tracked_frames: list[str]
 ) -> None:

@@ -132,6 +132,7 @@ def _detect_without(monkeypatch: pytest.MonkeyPatch, left_out: list[int], centre
     monkeypatch.setattr("rodsight.tracking.missed_rods.detect_grains", detect)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radii", [(RADIUS,), ()])
 def test_missed_rods_are_measured_like_the_others(monkeypatch: pytest.MonkeyPatch, radii: tuple[float, ...]) -> None:
     image, centre = _draw("plain")

@@ -185,7 +185,7 @@ def test_only_ends_of_two_bars_that_meet_hold_a_disc_without_a_name_in_the_table
     assert [each.name for each in circles.find_corners(np.zeros((400, 400), np.float32), found)] == [corners[1].name]
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_frame_without_discs_has_bars_alone(visitor, photographs_only):
     (series,) = visitor.request("home")["series"]
     at = visitor.request("begin", **{key: series[key] for key in ("folder", "suffix", "name")})["at"]

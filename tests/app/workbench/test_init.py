@@ -38,7 +38,7 @@ def test_an_experiment_that_is_there_is_not_overwritten(folder, capsys):
     assert file.read_text() == "name = 'mine'\n"
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_new_folder_is_made_beside_the_photographs_and_goes_if_nothing_is_made(tmp_path, capsys):
     discs(tmp_path)
     flags = ("--photographs", "../shots/*.png", "--channel", "red", "--pixel-size", "1e-4", "--interval", "1")
@@ -122,7 +122,7 @@ def test_walls_that_cut_through_rods_are_left_out_and_named(tmp_path, capsys, mo
     assert "bottom" in (tmp_path / "walls.csv").read_text()
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_bars_without_texture_are_no_walls_but_impose_the_motion_of_the_outermost_rods(tmp_path, capsys):
     discs(tmp_path / "data")
     folder = tmp_path / "new"
@@ -139,7 +139,7 @@ def test_bars_without_texture_are_no_walls_but_impose_the_motion_of_the_outermos
     assert not (folder / "walls.csv").exists()
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_bars_that_do_not_hold_the_rods_do_not_end_the_set_up(tmp_path, capsys, monkeypatch):
     discs(tmp_path)
     lines = np.array([  # each runs the wrong way round

@@ -42,7 +42,7 @@ def test_removed_rods_are_inferred(poses) -> None:
         assert np.all(found.sigma[:, best] < 4 * NOISE)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 @pytest.mark.parametrize("mean", [2e-4, 1e-4], ids=["all alike", "twice the mean"])
 def test_removed_soft_rods_are_inferred_with_a_known_overlap(poses, mean) -> None:
     overlap = 2e-4

@@ -57,6 +57,7 @@ def test_an_observer_does_not_change_a_bit_of_an_accelerated_solve(heap):
         assert np.array_equal(unobserved.force, observed.force)
 
 
+@pytest.mark.slow
 def test_measured_sweeps_between_strides_of_an_accelerated_solve_have_the_same_residuals(heap):
     problem = assemble(*heap)
     each = np.concatenate([sweep.residuals for sweep in sweeps(problem, settings(5), every=[1] * 5 * PERIOD)])

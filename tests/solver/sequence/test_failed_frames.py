@@ -66,6 +66,7 @@ def test_an_unusable_frame_fails_alone(settings, spoil):
     assert_only_the_bad_one_failed(frames, sound_frames(settings))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [SETTINGS, ENSEMBLE], ids=["nlgs", "ensemble"])
 def test_a_half_black_frame_is_reported_with_a_low_trust(settings):
     packing, snapshots = sheared_frames(COUNT)

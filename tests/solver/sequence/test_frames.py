@@ -58,7 +58,7 @@ def solved_heap(settings=SETTINGS, count=4):
     return run(*sheared_frames(count), settings)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [SETTINGS, ENSEMBLE], ids=["nlgs", "ensemble"])
 def test_a_sequence_resumes_from_a_stored_state_bit_for_bit(settings):
     packing, snapshots = sheared_frames(5)
@@ -141,6 +141,7 @@ def test_every_sweep_is_counted_and_the_last_recorded_one_has_the_forces_of_the_
     assert history.fn[-1] == pytest.approx(frame.nlgs_fn.astype(np.float32))
 
 
+@pytest.mark.slow
 def test_chains_without_forces_sweep_in_proportion_to_the_grains_until_they_have_advanced(monkeypatch):
     packing, snapshots = sheared_frames(5)
     settings = replace(ENSEMBLE, reset_frames=frozenset({3}))

@@ -15,7 +15,7 @@ from tests.solver.posterior.simulated import simulate_shear
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_projected_mixture_has_the_sum_of_the_motion_by_its_weight(monkeypatch: pytest.MonkeyPatch) -> None:
     sheared = simulate_shear(0.25, 6)
     mix, project, match = estimates._mix, equilibrium_mixture.project_mixed_field, equilibrium_mixture.mix_on_contacts

@@ -44,7 +44,7 @@ def test_every_frame_reads_the_motion_of_so_many_photographs(monkeypatch):
     assert begins(monkeypatch) == pytest.approx([0, 1, 2, 3, 3, 3, 3, 3])
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_frame_continues_the_forces_of_the_frame_where_its_motion_begins(monkeypatch):
     solved = solve(THREE)
     continued = {}
@@ -61,7 +61,7 @@ def test_a_frame_continues_the_forces_of_the_frame_where_its_motion_begins(monke
         assert not np.array_equal(continued[k].soft.force, solved[k - 1][1].members.soft.force)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_what_is_counted_by_photographs_is_still_counted_so():
     one, three = solve(ONE), solve(THREE)
     for (single, _), (spanned, state) in zip(one, three, strict=True):
@@ -71,7 +71,7 @@ def test_what_is_counted_by_photographs_is_still_counted_so():
         assert state.time == 30.0 * spanned.frame
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_motion_and_forces_from_before_a_reset_are_not_used(monkeypatch):
     assert begins(monkeypatch, verdicts={4: Verdicts(reset=True)}) == pytest.approx([0, 1, 2, 3, 3, 1, 2, 3])
     solved = solve(THREE, verdicts={4: Verdicts(reset=True)})

@@ -185,6 +185,7 @@ def test_trust_in_smoothed_tracks_is_limited_with_its_reason():
     assert limit_for_smoothing(low) is low
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
 def test_smoothed_tracks_of_a_sheared_packing_are_named_and_measured_ones_are_not(tmp_path):
     inputs = read_inputs(load_experiment(make_scenario(tmp_path, "sheared", 6, grains=100).folder, ()))

@@ -99,7 +99,7 @@ def test_a_watched_run_ends_with_the_full_recording_only(tracked, tmp_path, caps
     assert len(read_forces(out / "recording.rrd")) == 5
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_recording_of_another_process_is_complete(results, tmp_path):
     messages: list[str] = []
     live = LiveProcess(tmp_path / "live.rrd", messages.append, viewer="web")

@@ -91,7 +91,7 @@ def test_a_part_of_another_recording_is_ignored(whole, split, tmp_path):
     assert parts_of(tmp_path / "recording.rrd") == [tmp_path / "recording.rrd"]
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_size_is_that_of_all_parts(results, tmp_path):
     full = write_recording(results, tmp_path / "full.rrd", options=RecordingOptions(part_frames=IN_ONE, sweeps="all"))
     less = write_recording(

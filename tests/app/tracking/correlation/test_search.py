@@ -42,6 +42,7 @@ def test_the_quintic_spline_is_that_of_a_slow_reference(texture: np.ndarray) -> 
     assert np.abs(np.array(found) - expected).max() < SPLINE_ALLOWED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("search", [search_patch, search_parts])
 def test_a_search_finds_the_greatest_zncc(texture: np.ndarray, search) -> None:
     radius, origin = 5.0, (20.0, 18.0)

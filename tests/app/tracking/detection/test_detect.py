@@ -83,6 +83,7 @@ def test_nothing_is_found_on_an_empty_photograph() -> None:
     assert detect_grains(noise, DetectionSettings(radii=CLASSES)).count == 0
 
 
+@pytest.mark.slow
 def test_position_without_a_grain_has_no_quality() -> None:
     blank = np.full((300, 300), 30.0, np.float32)
     found = refine_grains(blank, np.array([150.0]), np.array([150.0]), np.array([30.0]))

@@ -66,7 +66,7 @@ def test_discs_are_counted_in_every_channel_of_a_coloured_photograph() -> None:
     assert count["blue"] < 5
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_views_are_ordered_by_the_outlines_that_they_show() -> None:
     column, row = np.meshgrid(np.arange(5), np.arange(4))
     x, y = 30.0 + 32.0 * column.ravel(), 30.0 + 32.0 * row.ravel()

@@ -59,7 +59,7 @@ def first(laboratory: Laboratory, rods: Rods, tmp_path_factory: pytest.TempPathF
     return photographed(tmp_path_factory.mktemp("brown"), laboratory, rods, 0.0, 0.0, np.zeros(rods.count), 1)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 @pytest.mark.parametrize("known", [True, False])
 def test_brown_rods_are_all_found(first: np.ndarray, rods: Rods, known: bool) -> None:
     settings = DetectionSettings(radii=CLASSES) if known else DetectionSettings(radius_range=(11.0, 36.0))
@@ -89,7 +89,7 @@ def test_brown_rods_are_followed_over_thirteen_pixels_and_five_degrees(
     assert (poses.status != TrackStatus.SUSPECT).mean() > 0.97
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(SIDE, SIDE), pytest.param((WIDTH, HEIGHT), marks=pytest.mark.screen)])
 def test_circles_at_the_border_do_not_run_away_and_swallow_others(
     laboratory: Laboratory, tmp_path: Path, size: tuple[int, int]

@@ -34,7 +34,7 @@ def make_tracker(light: Light, discs: Discs, force: float = 0.8) -> OutlineTrack
     return OutlineTracker(image, Detection(*rough, radius + 0.3, np.full(n, 0.1), np.ones(n)), SETTINGS)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_discs_are_tracked_with_changing_interiors(discs: Discs, kind: str) -> None:
     x, y, radius = discs
