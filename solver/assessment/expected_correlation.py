@@ -37,6 +37,9 @@ MEASURES: dict[str, Callable[[Evidence], float]] = {
     "coarse_step": lambda e: e.shear,
     # two readings of the positions: the posterior, and the balance of overlaps
     "disagreement_of_positions": lambda e: 1.0 - e.position_agreement,
+    # without a load: boundary grains, whose forces satisfy no balance, leave more of the others open
+    "undetermined": lambda e: e.information.undetermined,
+    "noise": lambda e: e.information.noise / e.information.diameter,
 }
 # Where nothing slides, these are small for want of motion, which is no evidence for the forces: estimates that know the
 # balance of forces alone agree, too.
@@ -111,7 +114,8 @@ def predict_correlation(evidence: Sequence[Evidence], *, contradicted: bool = Fa
     -----
     As `expect_correlation`, by the mean of ln x_j over the photographs; the interval is tanh(g ± sd).
     """
-    table = FITTED["expected_correlation"]["prediction"]
+    loaded = all(each.loaded for each in evidence)
+    table = FITTED["expected_correlation"]["prediction" if loaded else "unloaded_prediction"]
     score = float(table["constant"])
     for name, each in _terms(table):
         known = [_logarithm(each, x) for x in map(MEASURES[name], evidence) if not math.isnan(x)]
@@ -223,11 +227,17 @@ def _logarithm(table: dict[str, Any], measure: float) -> float:
 
 
 def _table(evidence: Evidence) -> dict[str, Any]:
-    """The table for the evidence at hand: of overlaps of soft grains, of both estimates, or of the motion alone."""
+    """The table for the evidence at hand.
+
+    Of overlaps of soft grains; of the motion alone; of both estimates, under a known load or without one, where
+    balance determines less of the forces.
+    """
     tables = FITTED["expected_correlation"]
     if rests_on_overlaps(evidence) and not math.isnan(evidence.position_agreement) and "overlaps" in tables:
         return tables["overlaps"]
-    return tables["motion" if math.isnan(evidence.agreement) else "both"]
+    if math.isnan(evidence.agreement):
+        return tables["motion"]
+    return tables["both" if evidence.loaded else "unloaded"]
 
 
 def _terms(table: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:

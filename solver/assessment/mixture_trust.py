@@ -141,7 +141,7 @@ def expected_of_motion(reliability: float, *, scale_known: bool) -> float:
 
 
 def evident_position_weight(evidence: Evidence) -> float:
-    """Weight of the position-only estimate beside a motion estimate of hard grains under a known load.
+    """Weight of the position-only estimate beside a motion estimate of hard grains.
 
     Parameters
     ----------
@@ -155,13 +155,19 @@ def evident_position_weight(evidence: Evidence) -> float:
     Returns
     -------
     float
-        w = 1/(1 + exp(−s)) in (0, 1), with a from fitted.toml and
+        w = 1/(1 + exp(−s)) in (0, 1), with a from fitted.toml, others of grains without a known load, and
         s = a_0 + a_1 ln ε + a_2 ln(1 − c) + a_3 ln p + a_4 ln D + a_5 (arctanh c − arctanh d)
             + a_6 ln h + a_7 ln u + a_8 arctanh b.
     """
-    table = FITTED["position_weight"]
-    score = float(position_weight_terms(evidence) @ np.array([table[name] for name in WEIGHT_TERMS]))
+    score = float(position_weight_terms(evidence) @ weight_coefficients(loaded=evidence.loaded))
     return 1.0 / (1.0 + math.exp(-score))
+
+
+def weight_coefficients(*, loaded: bool) -> Array:
+    """Coefficients (t,) of the terms of `evident_position_weight`."""
+    table = FITTED["position_weight"]
+    table = table if loaded else table["unloaded"]
+    return np.array([table[name] for name in WEIGHT_TERMS])
 
 
 def position_weight_terms(evidence: Evidence) -> Array:

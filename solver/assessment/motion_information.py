@@ -1,4 +1,4 @@
-"""Information in the motion that leads to a frame: how much sliding and gaps reveal of its forces.
+"""Information in the motion that leads to a frame: how much sliding, gaps and balance reveal of its forces.
 
 Agreement of the estimators is no information: where nothing slides, or where noise hides the sliding, all ensemble
 members agree, and nothing contradicts them.
@@ -49,6 +49,7 @@ class MotionInformation:
     beyond: int  # grains beyond a wall, which touch nothing there
     soft: bool = False  # gaps are overlaps that forces make
     unexplained_gap: float = np.nan  # [m] gap_error without the overlaps that are proportional to the forces
+    undetermined: float = np.nan  # fraction of the components of the forces that balance leaves open
 
 
 NO_INFORMATION = MotionInformation(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0)
@@ -98,7 +99,34 @@ def measure_motion_information(
         noise, motion_scale(motion, noise), sliding, signal, gap_error, 2.0 * float(grains.radius.mean()),
         _count_beyond(packing.walls_of(snapshot), snapshot, contacts), soft,
         _beyond_noise(_without_overlap(strong), strong, noise) if soft else gap_error,
+        undetermined_fraction(contacts, fn, snapshot.present & grains.free),
     )  # fmt: skip
+
+
+def undetermined_fraction(contacts: Contacts, fn: Array, balanced: NDArray[np.bool_]) -> float:
+    """Fraction of the components of the contact forces that the balance of grains leaves open.
+
+    Parameters
+    ----------
+    contacts : Contacts
+    fn : ndarray, shape (c,)
+        Their normal forces [N].
+    balanced : ndarray, shape (n,)
+        Grains whose forces and moments are in balance: neither absent nor of the boundary.
+
+    Returns
+    -------
+    float
+        1 − 3 m/(2 c), c the contacts that hold grains and m the balanced grains that they touch: f_n and f_t of every
+        contact against ΣF_x, ΣF_y and ΣM of every grain. NaN without such a contact.
+    """
+    bearing = fn > 0.0
+    holding = fn > LOOSE * fn[bearing].mean() if bearing.any() else bearing
+    count = int(holding.sum())
+    touched = np.zeros(len(balanced), np.bool_)
+    touched[contacts.i[holding]] = True
+    touched[contacts.j[holding & ~contacts.with_wall]] = True
+    return 1.0 - 1.5 * int((touched & balanced).sum()) / count if count else np.nan
 
 
 def _slide_signal(slid: Array, slide_sd: Array, fn: Array) -> float:

@@ -203,6 +203,10 @@ def _contradictions(evidence: Evidence) -> list[Penalty]:
         "inertial_number": f"the inertial number is {evidence.inertial_number:.2g}: part of the forces accelerates "
         "grains; load more slowly, or photograph at rest",
         "coarse_step": f"photographs are {step:.2g}° of shear apart: take them every .25°",
+        "undetermined": f"no load is known, and balance leaves {100.0 * found.undetermined:.0f} % of the components of "
+        "forces open: photograph the walls, and state the load on one",
+        "noise": f"a noise of {1e6 * found.noise:.3g} µm hides overlaps, and no load is known: state one, or measure "
+        "positions more exactly",
         "force_change": f"{100.0 * evidence.force_change:.0f} % of the force pattern is new{coarse}",
     }
     return [Penalty(loss, words[name], counted=True) for name, loss in losses(evidence).items()]

@@ -83,6 +83,15 @@ class Packing:
         """Whether loads or weight fix the scale of the forces; otherwise they are known up to a factor."""
         return bool(np.isfinite(self.pressure).any() or any(self.material.gravity))
 
+    @property
+    def is_loaded(self) -> bool:
+        """Whether a known load bears on the grains, or weight in a packing without boundary grains.
+
+        The forces of boundary grains, and of walls without a load, satisfy no balance.
+        """
+        weight_alone = any(self.material.gravity) and bool(self.grains.free.all())
+        return bool(np.isfinite(self.pressure).any()) or weight_alone
+
     def mean_pressure(self, snapshot: Snapshot) -> float:
         """Return the mean pressure of the plates at a snapshot [Pa]; 0 without a plate."""
         plates = np.isfinite(self.pressure)

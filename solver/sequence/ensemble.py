@@ -200,7 +200,7 @@ def _solve_members(
         steps, convex = found[: len(starts)], found[len(starts) :]
     else:
         steps = parallel_map(starts, workers)
-        balance = assemble_frame_balance(problem, touching.contacts, steps[0])
+        balance = assemble_frame_balance(problem, touching.contacts, steps[0].solution.fn)
         slips = list(_slips(problem, touching.contacts))
         convex = parallel_map(_member_tasks(problem, state, touching, balance, slips), workers)
     chains = _compare_chains(touching.contacts, steps, state)
@@ -281,12 +281,12 @@ def _compare_chains(contacts: Contacts, steps: list[ChainStep], state: EnsembleS
     return _Chains(soft, stiff, other.memory, difference, agreeing)
 
 
-def assemble_frame_balance(problem: FrameProblem, contacts: Contacts, soft: ChainStep | None = None) -> Balance:
-    """Balance of the frame on these contacts; soft: the first chain, needed where no load sets the scale."""
+def assemble_frame_balance(problem: FrameProblem, contacts: Contacts, fn: Array | None = None) -> Balance:
+    """Balance of the frame on these contacts (c); fn (c,): of the first chain, needed where no load sets the scale."""
     packing, walls, wall_total = problem.packing, problem.walls, None
     if not packing.scale_is_known:  # without load and weight forces are known up to a scale: that of the first chain
-        assert soft is not None
-        wall_total = float(soft.solution.fn[contacts.gauge].sum())
+        assert fn is not None
+        wall_total = float(fn[contacts.gauge].sum())
     return assemble_balance(
         contacts, packing.grains, walls, present=problem.snapshot.present,
         friction=packing.material.friction_at(contacts.with_wall),

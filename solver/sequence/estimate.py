@@ -112,7 +112,9 @@ def estimate_frame(problem: FrameProblem, state: SequenceState) -> tuple[Estimat
             evidence = gather_evidence(problem, offered, state)
             evidence = _with_agreements(problem, evidence, offered, posterior)
             reliability = limit_by_fringes(motion_reliability(evidence), offered.contacts, offered.fn, posterior)
-            mixed = _mix(problem, offered, posterior, reliability)
+            hard = not (problem.settings.soft or np.isnan(reliability) or posterior.fringes is not None)
+            weight = evident_position_weight(evidence) if hard else None
+            mixed = _mix(problem, offered, posterior, reliability, position_weight=weight)
             if posterior.fringes is not None and np.isfinite(posterior.fringes.scale):
                 total = float(mixed.fn.sum())
                 mixed = mixed.scaled(
@@ -298,6 +300,7 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
         inertial_number=_inertial_number(problem, load),
         power_gap=estimate.power_gap,
         scale_disagreement=estimate.scale_disagreement if not load > 0.0 and packing.scale_is_known else np.nan,
+        loaded=packing.is_loaded,
     )
 
 

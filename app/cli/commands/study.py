@@ -316,8 +316,9 @@ def _study_mixture(request: _StudyRequest) -> int:
     from ...study.scenarios.mixture_fit import print_mixture, sample_mixtures
 
     with progress_of(request.quiet) as progress:
-        sample = sample_mixtures(request.plan, request.scenarios or get_args(ScenarioName), request.seeds, progress)
-    print_mixture(table_console(), sample)
+        samples = sample_mixtures(request.plan, request.scenarios or get_args(ScenarioName), request.seeds, progress)
+    for each in samples:
+        print_mixture(table_console(), each)
     return 0
 
 

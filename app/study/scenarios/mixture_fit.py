@@ -23,12 +23,12 @@ from ...experiment.experiment import load_experiment
 from ...inference.corrected_sequence import CorrectedSequence
 from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
-from ...solver.assessment.fitted import FITTED
 from ...solver.assessment.mixture_trust import (
     LEAST_WEIGHT,
     WEIGHT_TERMS,
     motion_reliability,
     position_weight_terms,
+    weight_coefficients,
 )
 from ...solver.baselines.motion_free import overlap_balance
 from ...solver.bodies.grains import Array
@@ -60,16 +60,19 @@ EXCESS = 0.005  # loss against the better part that is counted
 
 @dataclass(frozen=True, slots=True)
 class MixtureSample:
-    """Frames of hard grains under a known load; f frames."""
+    """Frames of hard grains; f frames."""
 
     kind: NDArray[np.str_]  # (f,)
     terms: Array  # (f, t) of the logarithm of w/(1 − w)
     r: Array  # (f, 7) correlation of the mixture of every weight with the truth; of weight 0 the motion estimate
     positions: Array  # (f,) correlation of the position-only estimate, on contacts of its own
+    loaded: bool = True  # see `Packing.is_loaded`: coefficients differ
 
     def select(self, chosen: NDArray[np.bool_]) -> MixtureSample:
         """The chosen frames (f,)."""
-        return MixtureSample(self.kind[chosen], self.terms[chosen], self.r[chosen], self.positions[chosen])
+        return replace(
+            self, kind=self.kind[chosen], terms=self.terms[chosen], r=self.r[chosen], positions=self.positions[chosen]
+        )
 
     def reached(self, weight: Array) -> Array:
         """Correlation (f,) of the mixtures of these weights (f,)."""
@@ -83,10 +86,13 @@ class MixtureSample:
 
 def sample_mixtures(
     plan: StudyPlan, scenarios: Sequence[ScenarioName], seeds: Sequence[int], progress: Progress = no_progress
-) -> MixtureSample:
-    """Solve scenarios by their motion alone, and mix every second frame with its position-only estimate."""
+) -> list[MixtureSample]:
+    """Solve scenarios by their motion alone, and mix every second frame with its position-only estimate.
+
+    Returns the frames under a known load and those without, where there are any.
+    """
     motion = replace(plan, settings=(*plan.settings, *ALONE))
-    found: list[tuple[str, Array, Array, float]] = []
+    found: dict[bool, list[tuple[str, Array, Array, float]]] = {True: [], False: []}
     cases: list[tuple[ScenarioName, int]] = [(name, seed) for name in scenarios for seed in seeds]
     for done, (name, seed) in enumerate(cases):
         progress("mixtures", done, len(cases))
@@ -99,8 +105,13 @@ def sample_mixtures(
                 solution = solve_scenario(experiment, progress)
             except (InputError, UnbalancedError):
                 continue
-            found += [(name, *each) for each in _mix_frames(solution, true_forces(experiment, solution.sequence))]
-    return MixtureSample(*(np.array(column) for column in zip(*found, strict=True)))
+            rows = [(name, *each) for each in _mix_frames(solution, true_forces(experiment, solution.sequence))]
+            found[solution.sequence.packing.is_loaded] += rows
+    return [
+        MixtureSample(*(np.array(column) for column in zip(*rows, strict=True)), loaded=loaded)
+        for loaded, rows in found.items()
+        if rows
+    ]
 
 
 def fit_weight(sample: MixtureSample) -> Array:
@@ -135,11 +146,12 @@ def print_mixture(console: Console, sample: MixtureSample) -> None:
 
     Kinds on which the trust is judged are not read by the fit.
     """
+    title = "[position_weight]" if sample.loaded else "[position_weight.unloaded]"
     _print_kinds(console, sample)
     read = ~np.isin(sample.kind, list(LEFT_OUT))
     coefficients = fit_weight(sample.select(read) if read.any() else sample)
     values = ", ".join(f"{name} = {x:.3f}" for name, x in zip(WEIGHT_TERMS, coefficients, strict=True))
-    console.print(f"[position_weight] {values}", markup=False, highlight=False, soft_wrap=True)
+    console.print(f"{title} {values}", markup=False, highlight=False, soft_wrap=True)
     weight, kinds = np.zeros(len(sample.r)), np.unique(sample.kind)
     for fold in range(FOLDS):
         away = np.isin(sample.kind, kinds[fold::FOLDS])
@@ -163,8 +175,7 @@ def print_mixture(console: Console, sample: MixtureSample) -> None:
 
 def _mixed(sample: MixtureSample) -> Array:
     """Return the correlations (f,) of the mixtures of a run, with the weights of fitted.toml."""
-    table = FITTED["position_weight"]
-    weight = expit(sample.terms @ np.array([table[name] for name in WEIGHT_TERMS]))
+    weight = expit(sample.terms @ weight_coefficients(loaded=sample.loaded))
     return sample.reached(np.where(weight < LEAST_WEIGHT, 0.0, weight))
 
 
@@ -191,10 +202,8 @@ def _print_kinds(console: Console, sample: MixtureSample) -> None:
 
 
 def _mix_frames(solution: ScenarioSolution, true: Sequence[tuple[Keys, Array]]) -> list[tuple[Array, Array, float]]:
-    """Terms (t,) and correlations (7,) of the frames of hard grains under a known load, and of positions alone."""
+    """Terms (t,) and correlations (7,) of the frames of hard grains, and of positions alone."""
     sequence, found = solution.sequence, []
-    if not sequence.packing.scale_is_known:
-        return []
     estimates = PositionEstimates(sequence.packing, sequence.snapshots, sequence.settings.posterior, 1)
     for k in range(FIRST, len(solution.unchecked), STRIDE):
         frame, positions = solution.unchecked[k], estimates.at(k)
@@ -229,7 +238,7 @@ def mixed_forces(
         SequenceState.first(sequence.packing),
     )  # fmt: skip
     balanced = FrameBalance(
-        frame.contacts, problem.snapshot.position, assemble_frame_balance(problem, frame.contacts),
+        frame.contacts, problem.snapshot.position, assemble_frame_balance(problem, frame.contacts, frame.fn),
         problem.settings.ensemble.convex, problem.packing.scale_is_known, any(problem.packing.material.gravity),
     )  # fmt: skip
     fn_sd, ft_sd = np.nanstd(frame.member_force, axis=1).T

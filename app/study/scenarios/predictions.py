@@ -33,7 +33,7 @@ TRUE_CAUSE: dict[ScenarioName, tuple[str, ...]] = {
     "mu_01": ("friction",), "mu_05": ("friction",), "mu_low": ("friction",), "mu_high": ("friction",),
     "walls_late": ("walls_shifted",), "left_late": ("walls_shifted",), "top_fixed": ("wall_at_rest", "wall_misplaced"),
     "wall_inside": ("wall_misplaced",), "aspect_03": ("stretched_picture",), "aspect_1": ("stretched_picture",),
-    "lens_03": ("lens",),
+    "lens_03": ("lens",), "outer_theta_sign": ("rotation_sign",), "outer_mu_05": ("friction",),
     "soft_stretched": ("stretched_picture",), "softer_stretched": ("stretched_picture",),
     "class_2": ("class_radii",), "wrong_class": ("exchanged_sizes",),
     **dict.fromkeys(

@@ -64,6 +64,7 @@ class ScenarioScore:
     scale_sd: tuple[float | None, ...] = ()  # (f,) as stated
     status: tuple[str, ...] = ()  # (f,)
     overlaps: tuple[bool, ...] = ()  # (f,) whether the forces follow from the overlaps of soft grains
+    loaded: bool = True  # see `Packing.is_loaded`
     coverage: tuple[float | None, float | None] = (None, None)  # of f_n by one and by two standard deviations
     r_ours: float | None = None  # on all candidate pairs, mean from SETTLED on, as the next three
     r_static: float | None = None
@@ -135,6 +136,7 @@ def score_scenario(
         closed_overlap=tuple(_plain(closed_overlap(each)) for each in solution.evidence),
         scale_terms=tuple(tuple(_plain(term) for term in scale_terms(each)) for each in solution.evidence),
         overlaps=tuple(rests_on_overlaps(each) for each in solution.evidence),
+        loaded=solution.sequence.packing.is_loaded,
         measures=tuple(tuple(_plain(measure(each)) for measure in MEASURES.values()) for each in solution.evidence),
     )
 

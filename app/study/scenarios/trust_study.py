@@ -35,6 +35,7 @@ LEFT_OUT = frozenset({
     "stiff_loose", "rough_walls", "rising_corners", "shear_box", "footing", "intruder", "drum", "stiffest",
     "isotropic_centres", "stepped_centres", "rising_centres", "annulus_centres", "cycles_centres", "annulus_radii_1",
     "cycles_radii_1", "tilted_radii_1", "stepped_some_radii", "annulus_some_radii", "rising_lens", "exchanged_ids",
+    "outer_moving", "outer_gravity",
 })  # fmt: skip
 # Kinds at rest whose errors look like overlaps, by which the effect of closed gaps is fitted; others judge it.
 CLOSED_KINDS: tuple[ScenarioName, ...] = (
@@ -52,9 +53,11 @@ SOFT = 1.9e6  # [N/m] stiffness of contacts below which overlaps are forces
 SETTLED_SCALE = 3  # first photograph whose scale is judged
 SETTLED = 2  # first photograph of a trial solution that is judged
 FOLDS = 6  # groups of kinds that are left out in turn
+ONLY_UNLOADED = "undetermined", "noise"
 # The fits, each with the measures that it weighs.
 FITS: dict[str, tuple[str, ...]] = {
-    "both": tuple(MEASURES),
+    "both": tuple(name for name in MEASURES if name not in ONLY_UNLOADED),
+    "unloaded": tuple(name for name in MEASURES if name not in ("load_mismatch", "inertial_number")),
     "motion": (
         "correction", "previous_residual", "disagreement_of_members", "gap_error", "force_change", "power_gap",
         "hidden_sliding", "load_mismatch",
@@ -64,7 +67,11 @@ FITS: dict[str, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 # Of a prediction from the first photographs.
-PREDICTED_BY = tuple(name for name in MEASURES if name != "gap_error")
+PREDICTIONS = {"prediction": True, "unloaded_prediction": False}  # tables, and whether their tests are loaded
+PREDICTED_BY = {
+    title: tuple(name for name in FITS["both" if loaded else "unloaded"] if name != "gap_error")
+    for title, loaded in PREDICTIONS.items()
+}
 # Least and greatest value of each measure: beyond them no more is known.
 RANGES = {
     "disagreement_of_estimates": (0.02, 1.0), "disagreement_with_either": (0.03, 1.0),
@@ -73,7 +80,7 @@ RANGES = {
     "disagreement_of_members": (0.05, 1.0), "gap_error": (1e-4, 5e-3), "force_change": (0.01, 0.6),
     "power_gap": (0.01, 1.5), "disagreement_of_positions": (0.003, 1.0), "hidden_sliding": (0.03, 10.0),
     "load_mismatch": (0.02, 2.0), "force_residual": (0.002, 0.5), "inertial_number": (1e-3, 0.1),
-    "coarse_step": (0.004, 0.02),
+    "coarse_step": (0.004, 0.02), "undetermined": (0.02, 0.5), "noise": (1e-4, 5e-3),
 }  # fmt: skip
 
 
@@ -87,6 +94,7 @@ class TrustSample:
     group: NDArray[np.str_]  # (f,)
     suspect: NDArray[np.bool_]  # (f,)
     overlaps: NDArray[np.bool_]  # (f,) whether the forces follow from the overlaps of soft grains
+    loaded: NDArray[np.bool_]  # (f,) whether a known load, or weight alone, bears on the grains
     r: Array  # (f,)
     trust: Array  # (f,)
     expected: Array  # (f,)
@@ -108,7 +116,8 @@ class TrustSample:
             np.array([k for _, k in rows]),
             np.array([SCENARIOS[score.scenario].group for score, _ in rows]),
             np.array([score.status[k] == "suspect" for score, k in rows]),
-            np.array([score.overlaps[k] for score, k in rows]),
+            np.array([score.overlaps[k] for score, k in rows], np.bool_),
+            np.array([score.loaded for score, _ in rows], np.bool_),
             np.array([score.r[k] for score, k in rows], float),
             np.array([score.trust[k] for score, k in rows], float),
             np.array([score.expected[k] for score, k in rows], float),
@@ -138,7 +147,7 @@ class TrustSample:
         """The chosen frames."""
         return TrustSample(
             self.kind[chosen], self.seed[chosen], self.frame[chosen], self.group[chosen], self.suspect[chosen],
-            self.overlaps[chosen], self.r[chosen], self.trust[chosen], self.expected[chosen],
+            self.overlaps[chosen], self.loaded[chosen], self.r[chosen], self.trust[chosen], self.expected[chosen],
             {name: each[chosen] for name, each in self.measures.items()},
         )  # fmt: skip
 
@@ -188,7 +197,8 @@ def fit_expected(sample: TrustSample, names: Sequence[str]) -> TrustFit:
 def fit_by_title(scores: Sequence[ScenarioScore]) -> dict[str, TrustFit]:
     """Fit every one of FITS to the frames that it reads."""
     known = TrustSample.of(scores)
-    return {title: fit_expected(rows_of(known, title), names) for title, names in FITS.items()}
+    read = {title: rows_of(known, title) for title in FITS}
+    return {title: fit_expected(rows, FITS[title]) for title, rows in read.items() if len(rows.r)}
 
 
 def describe_fits(
@@ -210,16 +220,19 @@ def describe_fits(
     tests = TrustSample.of_tests([each for each in scores if not each.refused], photographs)
     return [
         *(fit.describe(title) for title, fit in fits.items()),
-        describe_prediction(tests), describe_scale_fit(scores), describe_closed_fit(still),
+        *(describe_prediction(title, tests.select(tests.loaded == loaded)) for title, loaded in PREDICTIONS.items()),
+        describe_scale_fit(scores), describe_closed_fit(still),
     ]  # fmt: skip
 
 
-def describe_prediction(tests: TrustSample) -> str:
-    """Fit the prediction on whole tests, and describe it as the table of fitted.toml."""
-    whole, score = _fit_leaving_out(tests, PREDICTED_BY)
+def describe_prediction(title: str, tests: TrustSample) -> str:
+    """Fit the prediction on whole tests, and describe it as the table of fitted.toml; empty without a test."""
+    if not len(tests.r):
+        return ""
+    whole, score = _fit_leaving_out(tests, PREDICTED_BY[title])
     sd = float(np.quantile(np.abs(correlation_target(tests.r) - score), WITHIN_INTERVAL))
     lines = whole.describe()
-    return "\n".join(["[expected_correlation.prediction]", *lines[:2], f"sd = {sd:.3f}", *lines[2:]])
+    return "\n".join([f"[expected_correlation.{title}]", *lines[:2], f"sd = {sd:.3f}", *lines[2:]])
 
 
 def describe_closed_fit(scores: Sequence[ScenarioScore]) -> str:
@@ -330,7 +343,7 @@ def refit(sample: TrustSample, fits: dict[str, TrustFit]) -> TrustSample:
     """The sample with expected correlation and trust by new fits, without the penalties outside of them."""
     expected, trust = sample.expected.copy(), sample.trust.copy()
     for name, fit in fits.items():
-        here = sample.overlaps if name == "overlaps" else ~sample.overlaps
+        here = sample.overlaps if name == "overlaps" else ~sample.overlaps & (sample.loaded == (name != "unloaded"))
         if name == "motion" or not here.any():
             continue
         some = sample.select(here)
@@ -344,7 +357,9 @@ def rows_of(sample: TrustSample, fit: str) -> TrustSample:
     if fit == "overlaps":
         soft = np.isin(sample.kind, [name for name, each in SCENARIOS.items() if _is_soft(each)])
         return sample.select(soft | sample.overlaps)
-    return sample.select(~sample.overlaps)
+    if fit == "motion":
+        return sample.select(~sample.overlaps)
+    return sample.select(~sample.overlaps & (sample.loaded == (fit == "both")))
 
 
 def _is_soft(scenario: Scenario) -> bool:

@@ -74,6 +74,20 @@ def crop_to_interior(observed: ObservedData, rng: np.random.Generator) -> Observ
     )  # fmt: skip
 
 
+def crop_after(depart: Departure) -> Departure:
+    """Keep the interior of the packing, after another departure."""
+
+    def both(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+        return crop_to_interior(depart(observed, rng), rng)
+
+    return both
+
+
+def omit_loads(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """State no load of any wall."""
+    return replace(observed, known=replace(observed.known, pressure={}))
+
+
 def state_membrane(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
     """State as the boundary all rods that a membrane on the right touches in any photograph."""
     top = observed.endpoints[:, observed.wall_names.index("top"), :, 1].mean(axis=1)

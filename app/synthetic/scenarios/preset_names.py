@@ -14,6 +14,8 @@ ScenarioName = Literal[
     "soft_stretched", "softer_stretched", "soft_unseen", "nearly_jammed",
     "corners", "short_walls", "unseen", "camera", "centres", "radii_03", "radii_1", "radius_offset",
     "mu_low", "mu_high", "step_05", "step_1", "ten_frames", "periodic", "outer", "circle", "loads",
+    "outer_biaxial", "outer_isotropic", "outer_gravity", "outer_moving", "outer_noise_40", "outer_radii_03",
+    "outer_theta_sign", "outer_mu_05", "unknown_load",
     "loose", "cyclic", "noise_40", "correlated_noise", "annulus", "tilted_bed", "tiny_cycles", "power_law",
     "isotropic_centres", "stepped_centres", "rising_centres", "annulus_centres", "cycles_centres",
     "annulus_radii_1", "cycles_radii_1", "tilted_radii_1",

@@ -16,6 +16,7 @@ from .departures import (
     HIGH_FRICTION,
     LOW_FRICTION,
     Departure,
+    crop_after,
     crop_to_interior,
     displace_centres,
     keep_ten_frames,
@@ -23,6 +24,7 @@ from .departures import (
     misstate_friction,
     misstate_wall_ends,
     move_camera,
+    omit_loads,
     omit_rods,
     scatter_radii,
     shrink_radii,
@@ -106,6 +108,8 @@ FRINGED_LOADINGS: dict[FringedPreset, LoadingPath] = {
 
 
 MOVED = LoadingPath(shear, 0.25, initial_shear=2.0, plates=("top",))  # the first photograph is like the others
+BIAXIAL = LoadingPath(compress_biaxially, 0.003, plates=("right",), sizes=choose_wide_radii)
+PUSHED_HEAP = LoadingPath(push_heap, 0.002, settings=HEAP, open_top=True)
 # Loadings by which hardly any contact slides.
 ISOTROPIC = LoadingPath(load_isotropically, 0.0)
 STEPPED = LoadingPath(step_loads, 0.0, measured=("top", "right"))
@@ -114,9 +118,19 @@ TILTED = LoadingPath(tilt_heap, 1.0, settings=HEAP, open_top=True)
 TINY = LoadingPath(shear_cyclically, 0.01, initial_shear=2.0, plates=("top",))
 
 
+def _cropped(
+    meaning: str, loading: LoadingPath, departure: Departure = crop_to_interior, noise: float = 1e-5,
+    group: Group = "correct",
+) -> Scenario:  # fmt: skip
+    return Scenario(f"{meaning}; cropped as in `outer`", loading, departure, noise, scale_stated=False, group=group)
+
+
 def _sheared(**changes: Any) -> LoadingPath:
     """Simple shear after 2° of it, with other settings of the simulation."""
     return replace(MOVED, settings=DemSettings(**changes))
+
+
+MOVING = _sheared(moving=True, unbalance_limit=10.0)
 
 
 def _choose_ten(count: int, rng: np.random.Generator) -> Array:
@@ -149,7 +163,7 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     ),
     "biaxial": Scenario(
         "biaxial compression of radii 1:5, .3 % a photograph, the right side under constant pressure",
-        LoadingPath(compress_biaxially, 0.003, plates=("right",), sizes=choose_wide_radii),
+        BIAXIAL,
     ),
     "isotropic": Scenario(
         "loaded and unloaded from two sides between 1 and 3 times 50 kPa; no pressure is stated",
@@ -167,7 +181,7 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     "rising_corners": Scenario("the same; walls end where the bars meet", RISING, state_corners),
     "gravity": Scenario(
         "a heap with a free surface, pushed by its right wall; no plate",
-        LoadingPath(push_heap, 0.002, settings=HEAP, open_top=True),
+        PUSHED_HEAP,
     ),
     "soft": Scenario(
         "simple shear of soft rods that overlap by about .25 % of a diameter",
@@ -215,6 +229,19 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
         crop_to_interior,
         scale_stated=False,
     ),
+    "outer_biaxial": _cropped("biaxial", BIAXIAL),
+    "outer_isotropic": _cropped("isotropic", ISOTROPIC),
+    "outer_gravity": _cropped("gravity", PUSHED_HEAP),
+    "outer_moving": _cropped("moving", MOVING),
+    "outer_noise_40": _cropped("sheared; 40 µm noise", MOVED, noise=4e-5),
+    "outer_radii_03": _cropped("sheared; radii with .3 % random error", MOVED, crop_after(scatter_radii(0.003))),
+    "outer_theta_sign": _cropped(
+        "sheared; rotations with the wrong sign", MOVED, crop_after(scale_rotation(-1.0)), group="wrong input"
+    ),
+    "outer_mu_05": _cropped(
+        "sheared; friction stated as .5 instead of .25", MOVED, crop_after(misstate_friction(0.5)), group="wrong input"
+    ),
+    "unknown_load": Scenario("sheared; the load is not stated", MOVED, omit_loads, scale_stated=False),
     "circle": Scenario(
         "a core is pushed and rotated through a packing in a ring under pressure, 1 % of its radius a photograph",
         LoadingPath(push_core, 0.01, plates=("ring",), ring=True),
@@ -245,7 +272,7 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     "power_law": Scenario("sheared; radii 1:6, most of them small", replace(MOVED, sizes=_choose_by_power_law)),
     "moving": Scenario(
         "sheared, photographed while it moves: rods without contact are not at rest",
-        _sheared(moving=True, unbalance_limit=10.0),
+        MOVING,
     ),
     "noise_40": Scenario("sheared; 40 µm noise", MOVED, noise=4e-5),
     "correlated_noise": Scenario("sheared; further errors of 10 µm that change slowly", MOVED, correlate_noise),

@@ -345,3 +345,18 @@ def test_a_wrong_argument_is_named(wrong: dict[str, float], named: str, tmp_path
     with pytest.raises(InputError, match=named):
         make_scenario(tmp_path / "out", "shear", 0, **wrong)  # type: ignore[arg-type]
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_cropped_packing_keeps_the_error_that_was_made_before(observed: ObservedData) -> None:
+    cropped = departures.crop_to_interior(observed, np.random.default_rng(1))
+    both = departures.crop_after(departures.misstate_friction(0.5))(observed, np.random.default_rng(1))
+    assert both.outer
+    assert both.known.friction == 0.5
+    np.testing.assert_array_equal(both.id, cropped.id)
+
+
+def test_loads_are_left_out(observed: ObservedData) -> None:
+    assert observed.known.pressure
+    unknown = departures.omit_loads(observed, np.random.default_rng(1))
+    assert not unknown.known.pressure
+    assert unknown.known == replace(observed.known, pressure={})

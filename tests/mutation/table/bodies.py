@@ -53,6 +53,8 @@ MUTANTS = [
         TESTS,
         ("face * self.length", "face"),
         ("if not 0.0 <= self.formal_weight <= 0.5:", "if not 0.0 <= self.formal_weight <= 1.0:"),
+        ("return bool(np.isfinite(self.pressure).any()) or weight_alone", "return weight_alone"),
+        ("any(self.material.gravity) and bool(self.grains.free.all())", "any(self.material.gravity)"),
     ),
     *mutants_of(
         "solver/bodies/motion.py",

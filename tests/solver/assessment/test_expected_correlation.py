@@ -42,7 +42,7 @@ def test_the_bound_is_below_the_expectation_and_the_gap_widens():
 
 
 def test_every_table_is_monotone_and_the_score_is_their_sum():
-    for title in ("both", "motion", "overlaps", "prediction"):
+    for title in ("both", "unloaded", "motion", "overlaps", "prediction", "unloaded_prediction"):
         table = FITTED["expected_correlation"][title]
         terms = {name: each for name, each in table.items() if isinstance(each, dict) and name != "bound"}
         assert terms.keys() <= MEASURES.keys()
@@ -165,3 +165,21 @@ def test_gaps_that_were_closed_count_where_forces_rest_on_them_and_nothing_slide
     assert closed_overlap(sliding) == 0.0
     assert bound_correlation(closed) < bound_correlation(still)
     assert losses(closed)["closed_overlap"] > 0.1
+
+
+def test_without_a_load_forces_that_balance_leaves_open_lower_the_trust():
+    """A packing whose outermost rods stand for its walls has the evidence of others, and less accurate forces."""
+    few, many = (
+        replace(BOTH, loaded=False, information=replace(BOTH.information, undetermined=each)) for each in (0.05, 0.4)
+    )
+    assert bound_correlation(many) < bound_correlation(few)
+    assert predict_correlation([many]) < predict_correlation([few])
+    under_load = replace(many, loaded=True)
+    assert bound_correlation(under_load) == bound_correlation(replace(few, loaded=True))
+    assert predict_correlation([under_load]) == predict_correlation([replace(few, loaded=True)])
+
+
+def test_one_photograph_without_a_load_makes_a_prediction_without_one():
+    without = replace(BOTH, loaded=False)
+    assert predict_correlation([BOTH, without]) == pytest.approx(predict_correlation([without, without]))
+    assert predict_correlation([BOTH, BOTH]) != pytest.approx(predict_correlation([without, without]))

@@ -14,8 +14,10 @@ from rodsight.solver.assessment.mixture_trust import (
     fused_trust,
     mixture_trust,
     motion_reliability,
+    position_weight_terms,
     reconcile_trusts,
     soft_mixture_trust,
+    weight_coefficients,
 )
 
 from tests.solver.assessment.test_status import SOUND
@@ -121,3 +123,12 @@ def test_positions_weigh_more_where_sliding_is_hidden_or_no_forces_of_the_motion
     assert evident_position_weight(still) > evident_position_weight(sliding)
     assert evident_position_weight(replace(given, unbalance=0.1)) > weight
     assert evident_position_weight(replace(given, unbalance=math.nan)) == weight  # not known
+
+
+def test_without_a_load_positions_have_a_weight_of_their_own():
+    given = replace(SOUND, correction=0.1, position_agreement=0.9, agreement=0.6, overlap_agreement=0.5, power_gap=0.2)
+    without = replace(given, loaded=False)
+    for each in (given, without):
+        score = position_weight_terms(each) @ weight_coefficients(loaded=each.loaded)
+        assert evident_position_weight(each) == pytest.approx(1.0 / (1.0 + math.exp(-score)))
+    assert evident_position_weight(without) != pytest.approx(evident_position_weight(given), abs=0.01)

@@ -11,6 +11,7 @@ from rodsight.solver.assessment.motion_information import (
     MotionInformation,
     measure_motion_information,
     motion_scale,
+    undetermined_fraction,
 )
 from rodsight.solver.bodies.motion import FrameMotion, no_motion
 from rodsight.solver.contacts.contacts import Contacts, detect_contacts
@@ -154,3 +155,29 @@ def test_grains_that_lie_beside_the_apparatus_are_no_part_of_the_packing(lattice
     for chosen, beyond in ((inside, 0), (inside | two, 0), (np.ones(contacts.count, np.bool_), 2)):
         pairs = contacts.select(chosen)
         assert measure(beside, rolling(snapshot, 0.0), pairs).beyond == beyond
+
+
+def test_balance_leaves_open_what_grains_do_not_determine(lattice):
+    _, snapshot, _, contacts = lattice
+    n = len(snapshot.present)
+    everything = np.ones(n, np.bool_)
+    force = np.ones(contacts.count)
+    left = 1.0 - 3.0 * n / (2.0 * contacts.count)
+    assert undetermined_fraction(contacts, force, everything) == pytest.approx(left)
+    assert measure(lattice, no_motion(snapshot)).undetermined == pytest.approx(left)
+    outer = everything.copy()
+    outer[: n // 2] = False
+    more = 1.0 - 3.0 * (n - n // 2) / (2.0 * contacts.count)
+    assert undetermined_fraction(contacts, force, outer) == pytest.approx(more)
+
+
+def test_contacts_that_hold_nothing_and_grains_without_contact_do_not_count(lattice):
+    _, snapshot, _, contacts = lattice
+    everything = np.ones(len(snapshot.present), np.bool_)
+    force, pair = np.ones(contacts.count), int(np.flatnonzero(~contacts.with_wall)[0])
+    force[:] = 1e-6
+    force[pair] = 1.0  # of two rods: six equations for two components
+    assert undetermined_fraction(contacts, force, everything) == pytest.approx(1.0 - 3.0)
+    wall = int(np.flatnonzero(contacts.with_wall)[0])
+    assert undetermined_fraction(contacts, np.arange(contacts.count) == wall, everything) == pytest.approx(1.0 - 1.5)
+    assert np.isnan(undetermined_fraction(contacts, np.zeros(contacts.count), everything))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numba
 import numpy as np
 import pytest
@@ -15,14 +17,14 @@ from tests.solver.posterior.simulated import simulate_shear
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_projected_mixture_has_the_sum_of_the_motion_by_its_weight(monkeypatch: pytest.MonkeyPatch) -> None:
     sheared = simulate_shear(0.25, 6)
     mix, project, match = estimates._mix, equilibrium_mixture.project_mixed_field, equilibrium_mixture.mix_on_contacts
     weights, sums, powers = [], [], []
 
-    def spy(problem, estimate, *arguments):
-        mixed = mix(problem, estimate, *arguments)
+    def spy(problem, estimate, *arguments, **further):
+        mixed = mix(problem, estimate, *arguments, **further)
         if problem.motion.ends_here and mixed.mixture.position_weight > 0.0:
             weights.append((1.0 - mixed.mixture.position_weight, float(estimate.fn.sum())))
         return mixed
@@ -50,3 +52,23 @@ def test_projected_mixture_has_the_sum_of_the_motion_by_its_weight(monkeypatch: 
     for (weight, motion), (total, counted, found, alone) in zip(weights, sums, strict=True):
         assert (total, counted) == pytest.approx((motion, weight))
         assert found == pytest.approx(alone + weight * (total - alone), rel=2e-3)
+
+
+@pytest.mark.thorough
+def test_without_a_load_the_evidence_weighs_the_positions_of_hard_grains(monkeypatch: pytest.MonkeyPatch) -> None:
+    sheared = simulate_shear(0.25, 4)
+    unloaded = replace(sheared.packing, pressure=np.full(len(sheared.packing.pressure), np.nan))
+    seen = []
+
+    def weigh(evidence):
+        seen.append(evidence.loaded)
+        return 0.37
+
+    monkeypatch.setattr(estimates, "evident_position_weight", weigh)
+    hard, soft = (
+        [each.position_weight for each, _ in solve_sequence(unloaded, sheared.snapshots, settings)]
+        for settings in (SequenceSettings(), SequenceSettings(soft=True))
+    )
+    assert hard[1:] == [pytest.approx(0.37)] * (len(hard) - 1)
+    assert not any(seen)
+    assert 0.37 not in np.round(soft, 6)  # overlaps that are forces have a weight of their own
