@@ -96,14 +96,16 @@ class Prediction:
         causes = " ".join(each.sentence() for each in self.diagnosis)
         if self._too_few:
             return f"The forces cannot be judged: {self._too_few}; {number}. {causes}".rstrip()
+        worst = self.trial.worst
         obstacle = "" if self.quality is None else self.quality.obstacle
+        obstacle = obstacle or (worst.words if worst.little_known else "")
         if causes:
             return f"Something is wrong: {number}. {causes}"
         if r >= GOOD:
             return f"The forces can be found: {number}."
         if r < POOR and obstacle:
             return f"These data cannot carry forces: {obstacle}; {number}."
-        reason = obstacle or self.trial.worst
+        reason = obstacle or worst.words
         if r < POOR:
             return f"Something is wrong: {number}; {reason}."
         return f"The forces are uncertain: {number}; {reason}."

@@ -21,6 +21,7 @@ SOFT_CHAIN_LOSS = 0.15  # where a single chain treats soft grains as hard
 BEYOND_WALL_LOSS = 12.0  # for each grain beyond a wall, per grain
 FEW_PHOTOGRAPHS, TRUST_OF_FEW = 3, 0.28  # of a test, below which the trust is at most the second
 LEFT_BY_INTERVALS = 2.5, 0.4  # of `most_by_intervals`
+LITTLE_KNOWN = frozenset({"undetermined", "noise"})  # measures that contradict nothing
 REPORTED = 0.04  # fraction of the trust above which a penalty is reported in words
 
 
@@ -30,6 +31,10 @@ class Penalty(NamedTuple):
     fraction: float  # of the trust that is lost
     words: str  # the cause; the cure
     counted: bool = False  # in `trust.motion_trust` already
+    little_known: bool = False  # the data show little, which contradicts nothing
+
+
+NO_PENALTY = Penalty(0.0, "")
 
 
 def assess(evidence: Evidence) -> Assessment:
@@ -209,7 +214,10 @@ def _contradictions(evidence: Evidence) -> list[Penalty]:
         "positions more exactly",
         "force_change": f"{100.0 * evidence.force_change:.0f} % of the force pattern is new{coarse}",
     }
-    return [Penalty(loss, words[name], counted=True) for name, loss in losses(evidence).items()]
+    return [
+        Penalty(loss, words[name], counted=True, little_known=name in LITTLE_KNOWN)
+        for name, loss in losses(evidence).items()
+    ]
 
 
 def _boundary(evidence: Evidence) -> Penalty | None:

@@ -131,7 +131,9 @@ def _compare_rivals(
     if best and best not in excluded:
         gain, words = rise[best]
         return [finding(best, f"if {words}, what the forces leave unexplained falls to {_remainder(gain)}")]
-    return [finding("not_explained", trial.worst)] if trial.expected[0] < UNEXPLAINED and trial.worst else []
+    worst = trial.worst
+    contradicted = bool(worst.words) and not worst.little_known
+    return [finding("not_explained", worst.words)] if contradicted and trial.expected[0] < UNEXPLAINED else []
 
 
 @one_thread_each

@@ -14,7 +14,7 @@ from ...process.errors import UndeterminedError
 from ...process.machine.linear_algebra import one_thread_each
 from ...solver.assessment.evidence import Evidence
 from ...solver.assessment.expected_correlation import correlation_score, expect_correlation, predict_correlation
-from ...solver.assessment.penalties import assess, find_penalties, most_by_intervals
+from ...solver.assessment.penalties import NO_PENALTY, Penalty, assess, find_penalties, most_by_intervals
 from ..correction.close_photographs import choose_span
 from ..correction.correct_sequence import correct_sequence
 from ..frame_store import MemoryStore
@@ -61,10 +61,9 @@ class Trial:
         return any(each.information.soft for each in self.evidence)
 
     @property
-    def worst(self) -> str:
-        """The weightiest reason against the forces, in words; empty: none."""
-        found = [each for evidence in self.evidence for each in find_penalties(evidence)[:1]]
-        return max(found).words if found else ""
+    def worst(self) -> Penalty:
+        """The weightiest reason against the forces; without words: none."""
+        return max((each for evidence in self.evidence for each in find_penalties(evidence)[:1]), default=NO_PENALTY)
 
 
 @one_thread_each

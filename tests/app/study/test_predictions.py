@@ -64,8 +64,19 @@ def test_a_named_cause_contradicts_the_evidence_unless_a_run_corrects_it():
 def test_the_weightiest_reason_is_stated():
     weak = replace(SOUND, correction=0.6)
     trial = Trial((weak, WRONG), 1)
-    assert trial.worst == max(find_penalties(WRONG)[0], find_penalties(weak)[0]).words
+    assert trial.worst == max(find_penalties(WRONG)[0], find_penalties(weak)[0])
     assert find_penalties(WRONG)[0].words != find_penalties(weak)[0].words
+
+
+def test_data_that_show_little_without_a_load_cannot_carry_forces():
+    little = replace(
+        SOUND, loaded=False, agreement=0.3, overlap_agreement=0.3, disagreement=0.9, position_agreement=0.6,
+        information=replace(SOUND.information, noise=7e-5, diameter=0.02, undetermined=0.45),
+    )  # fmt: skip
+    assert Trial((little,), 1).expected[0] < prediction.POOR
+    assert predicted(little).verdict().startswith("These data cannot carry forces: ")
+    assert "no load is known" in predicted(little).verdict()
+    assert predicted(WRONG).verdict().startswith("Something is wrong: ")
 
 
 def test_a_remark_states_why_there_is_no_prediction():

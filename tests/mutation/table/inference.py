@@ -184,6 +184,7 @@ MUTANTS = [
         ("rise[order[0]][0] < CLEAR", "rise[order[0]][0] < 0.1"),
         ("rise[order[1]][0] > AHEAD", "rise[order[1]][0] > 0.0"),
         ("trial.expected[0] < UNEXPLAINED", "trial.expected[0] < 2.0"),
+        ("bool(worst.words) and not worst.little_known", "bool(worst.words)"),
     ),
     *mutants_of(
         "app/inference/correction/friction.py",
@@ -286,7 +287,8 @@ MUTANTS = [
         ("(min(each, MOST_STATED) for each in (r, low, high))", "(r, low, high)"),
         ("if self.trial.stride > 1:", "if False:"),
         ("if r < POOR and obstacle:", "if False:"),
-        ("reason = obstacle or self.trial.worst", "reason = obstacle"),
+        ("reason = obstacle or worst.words", "reason = obstacle"),
+        ("if worst.little_known else", "if True else"),
         ("return self.remark or NOT_PREDICTED", "return NOT_PREDICTED"),
         ("trial is not None and trial.expected[0] < DOUBTFUL", "False"),
         ("if walls is None:", "if False:"),
