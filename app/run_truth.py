@@ -12,7 +12,7 @@ from .experiment.experiment import load_experiment
 from .process.errors import InputError
 from .results.hdf5.store import load_results, origin_of
 from .results.results import Results, TruthContacts
-from .results.truth import names_of_given, read_truth, true_ids, true_names
+from .results.truth import names_in_table, names_of_given, read_truth, true_ids, true_names
 from .run_folder import Run, find_experiment
 
 
@@ -49,7 +49,7 @@ def load_truth(run: Run, results: Results, file: Path | None = None) -> TruthCon
     if file is None and config.truth is None:
         return None
     first = run.frames.start
-    ids = results.tracks.id
+    ids = names_in_table(results.tracks)
     if config.truth_tracks is not None:
         find_names = true_names if config.tracks is None else names_of_given
         ids = find_names(folder / config.truth_tracks, results.tracks, first)
@@ -86,7 +86,7 @@ def truth_beside(results_file: Path, results: Results, file: Path) -> TruthConta
         The truth cannot be read, or its ids cannot be mapped.
     """
     config, frames = _stored_config(results), origin_of(results_file).frames
-    ids, unseen = results.tracks.id, None
+    ids, unseen = names_in_table(results.tracks), None
     poses = None if config is None or config.truth_tracks is None else file.parent / Path(config.truth_tracks).name
     if config is not None and poses is not None and (poses.is_file() or config.tracks is None):
         find_names = true_names if config.tracks is None else names_of_given

@@ -90,6 +90,11 @@ class Tracks:
         ),
     ] = None  # no photoelastic photographs
 
+    given_id: Annotated[
+        NDArray[np.int64] | None,
+        Quantity("name of the grain in the given table, where it confuses names", dims="frame grain", since=2),
+    ] = None  # everywhere its id
+
     def __post_init__(self) -> None:
         f, n = len(self.time), len(self.id)
         if self.position.shape != (f, n, 2):
@@ -97,7 +102,7 @@ class Tracks:
         for name in ("rotation", "sigma", "zncc", "status"):
             if getattr(self, name).shape != (f, n):
                 raise ValueError(f"{name} must be ({f}, {n}), not {getattr(self, name).shape}")
-        for name in ("second_zncc", "reference_frame", "fringes"):
+        for name in ("second_zncc", "reference_frame", "fringes", "given_id"):
             value = getattr(self, name)
             if value is not None and value.shape != (f, n):
                 raise ValueError(f"{name} must be ({f}, {n}), not {value.shape}")
@@ -192,6 +197,7 @@ class Tracks:
             None if self.reference_frame is None else self.reference_frame[part],
             None if self.failed_reason is None else self.failed_reason[part],
             self.inferred, self.boundary, None if self.fringes is None else self.fringes[part],
+            None if self.given_id is None else self.given_id[part],
         )  # fmt: skip
 
     def rearranged(self, row: NDArray[np.int64]) -> Tracks:

@@ -43,7 +43,8 @@ def read_truth(
     file
         Table frame,i,j,fn,ft, or its file.
     ids
-        Id of every grain in the truth (n,), negative for grains that the truth does not have.
+        Id of every grain in the truth (n,), or in every frame of the truth (f, n); negative for grains that the truth
+        does not have.
     walls
         Names of the walls.
     frame_count
@@ -63,16 +64,16 @@ def read_truth(
     table = file if isinstance(file, Table) else read_table(file, TRUTH_COLUMNS, inputs)
     number, i = table.integers("frame") - frames.start, table.integers("i")
     frame = np.where(number % frames.step == 0, number // frames.step, -1)
-    body = {int(each): row for row, each in enumerate(ids) if each >= 0}
-    wall = {name: len(ids) + row for row, name in enumerate(walls)}
+    wall = {name: ids.shape[-1] + row for row, name in enumerate(walls)}
+    bodies = [{int(each): row for row, each in enumerate(names) if each >= 0} for names in np.atleast_2d(ids)]
+    body_at = [bodies[k if 0 <= k < len(bodies) else 0] for k in frame.tolist()]
     pair = np.empty((len(table), 2), np.int64)
-    pair[:, 0] = [body.get(each, -1) for each in i.tolist()]
-    named = {str(each): row for each, row in body.items()} | wall
+    pair[:, 0] = [body.get(each, -1) for body, each in zip(body_at, i.tolist(), strict=True)]
     for row, text in enumerate(table.text("j")):
-        found = named.get(text)
+        found = wall.get(text)
         if found is None:
             try:
-                found = body.get(int(text), -1)  # such as 007
+                found = body_at[row].get(int(text), -1)
             except ValueError:
                 raise table.error(row, "j", "is neither a grain's id nor the name of a wall") from None
         pair[row, 1] = found
@@ -95,6 +96,14 @@ def read_truth(
     keep = np.flatnonzero(known & (frame >= 0) & (frame < frame_count))
     keep = keep[np.argsort(frame[keep], kind="stable")]
     return TruthContacts(frame[keep], low[keep], high[keep], fn[keep], ft[keep])
+
+
+def names_in_table(tracks: Tracks) -> NDArray[np.int64]:
+    """Return the ids of grains in the given table: (n,), or (f, n) where a tracker has confused names there.
+
+    A truth without a table of true poses has these names.
+    """
+    return tracks.id if tracks.given_id is None else tracks.given_id
 
 
 def true_ids(file: Path) -> NDArray[np.int64]:

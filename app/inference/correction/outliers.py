@@ -67,7 +67,7 @@ def restore_exchanged_ids(tracks: Tracks) -> tuple[Tracks, str]:
     row = find_exchanged_ids(np.where(tracks.present[..., None], tracks.position, np.nan))
     if (row == row[:1]).all():  # nothing to copy
         return tracks, ""
-    restored, events = tracks.rearranged(row), []
+    restored, events = replace(tracks.rearranged(row), given_id=tracks.id[row]), []
     for k in range(1, tracks.frame_count):
         changed = (row[k] != row[k - 1]) & restored.present_in(k)
         if changed.any():

@@ -45,6 +45,7 @@ def add_unseen(tracks: Tracks, walls: WallTracks, sizes: Array | None, overlap: 
         "reference_frame": np.zeros((f, u), np.int32),
         "boundary": np.zeros(u, np.bool_),
         "fringes": np.full((f, u), np.nan),
+        "given_id": np.tile(tracks.id.max() + 1 + np.arange(u), (f, 1)),
     }
     given = {each.name: getattr(tracks, each.name) for each in fields(tracks)}
     extended = {

@@ -175,6 +175,10 @@ def test_confused_names_are_given_back_with_all_of_their_poses():
         each[3:, [ROD, ROD + 1]] = each[3:, [ROD + 1, ROD]]
     found, words = restore_exchanged_ids(replace(tracks, **confused))
     assert words.endswith(f"{ROD} as {ROD + 1}, {ROD + 1} as {ROD} from photograph 3 on")
+    given = np.tile(tracks.id, (FRAMES, 1))
+    given[3:, [ROD, ROD + 1]] = tracks.id[[ROD + 1, ROD]]
+    assert found.given_id is not None
+    assert np.array_equal(found.given_id, given)
     for name in (*fields, "radius", "id"):
         assert np.array_equal(getattr(found, name), getattr(tracks, name)), name
 
@@ -197,6 +201,7 @@ def test_names_of_their_own_stay_without_a_word():
     found, words = restore_exchanged_ids(tracks)
     assert words == ""
     assert found is tracks
+    assert found.given_id is None
 
 
 def test_every_photograph_with_confused_names_is_listed_up_to_a_few():

@@ -42,6 +42,7 @@ def make_full_results(frame_count: int = 3, seed: int = 3, **options) -> Results
         centre_sigma=rng.random(n),
         second_zncc=rng.random((f, n)),
         fringes=np.arange(1.0, 1.0 + f * n).reshape(f, n),
+        given_id=np.arange(f * n).reshape(f, n),
         reference_frame=rng.integers(0, f, (f, n)).astype(np.int32),
         inferred=np.arange(n) > n - 3,
         boundary=np.arange(n) % 4 == 1,

@@ -79,7 +79,7 @@ def test_memory_is_independent_of_the_number_of_frames(tmp_path, monkeypatch):
         tracks = replace(
             tracks, failed_reason=None, time=np.arange(count, dtype=float),
             **{name: getattr(tracks, name)[over] for name in ("position", "rotation", "sigma", "zncc", "status")},
-            second_zncc=None, reference_frame=None, fringes=None,
+            second_zncc=None, reference_frame=None, fringes=None, given_id=None,
         )  # fmt: skip
         unknown = dict.fromkeys(("force", "sigma", "end_kind", "load", "cell"))
         walls = replace(few.walls, endpoints=few.walls.endpoints[over], **unknown)

@@ -103,7 +103,7 @@ def test_a_file_of_schema_1_keeps_its_values(tmp_path):
 def test_a_file_of_schema_2_keeps_its_values(file):
     full = make_full_results()
     walls = replace(full.walls, end_kind=None, side=None, load=None, cell=None, plate=None)
-    tracks = replace(full.tracks, inferred=None, boundary=None, fringes=None, failed_reason=None)
+    tracks = replace(full.tracks, inferred=None, boundary=None, fringes=None, failed_reason=None, given_id=None)
     grains = replace(full.grains, boundary=None)
     new = {
         "bearing_probability": None, "sliding_probability": None, "overlap": np.nan, "position_weight": 0.0,

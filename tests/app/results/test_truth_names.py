@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rodsight.process.errors import InputError
-from rodsight.results.truth import names_of_given, read_truth, true_ids, true_names
+from rodsight.process.frame_range import FrameRange
+from rodsight.results.truth import names_in_table, names_of_given, read_truth, true_ids, true_names
 from rodsight.tracks import Tracks, TrackStatus
 
 RADIUS = 0.008  # [m]
@@ -55,3 +57,16 @@ def test_contacts_of_unseen_rods_are_ignored_and_unknown_ids_refused(poses: Path
     truth.write_text("frame,i,j,fn,ft\n0,10,99,5,1\n")
     with pytest.raises(InputError, match=r"row 2, j = '99': is not the id of a grain"):
         read_truth(truth, names, ("top",), frame_count=1, unseen=true_ids(poses))
+
+
+def test_names_that_a_tracker_confused_are_those_of_the_table_in_every_frame(tmp_path: Path) -> None:
+    """Forces that another program lists under the names of its tracks belong to the grains that bear them."""
+    truth = tmp_path / "truth_contacts.csv"
+    truth.write_text("frame,i,j,fn,ft\n0,10,11,5,1\n2,12,11,7,2\n2,10,top,3,0\n7,99,11,1,0\n")
+    tracks = tracks_of([10, 11, 12], [TRUE[10], TRUE[11], TRUE[12]])
+    np.testing.assert_array_equal(names_in_table(tracks), tracks.id)
+    names = np.array([[10, 11, 12], [12, 11, 10]])
+    found = read_truth(truth, names, ("top",), frame_count=2, frames=FrameRange(0, None, 2), unseen=np.array([99]))
+    assert found.frame.tolist() == [0, 1, 1]
+    assert list(zip(found.i.tolist(), found.j.tolist(), strict=True)) == [(0, 1), (0, 1), (2, 3)]
+    np.testing.assert_array_equal(names_in_table(replace(tracks, given_id=names[1:])), names[1:])
