@@ -32,8 +32,9 @@ def add_unseen(tracks: Tracks, walls: WallTracks, sizes: Array | None, overlap: 
     if not found.count:
         return replace(tracks, inferred=np.zeros(tracks.grain_count, bool))
     f, u = tracks.frame_count, found.count
+    ids = tracks.id.max() + 1 + np.arange(u)
     new: dict[str, NDArray] = {
-        "id": tracks.id.max() + 1 + np.arange(u),
+        "id": ids,
         "radius": found.radius,
         "position": found.position,
         "rotation": np.full((f, u), np.nan),
@@ -45,7 +46,7 @@ def add_unseen(tracks: Tracks, walls: WallTracks, sizes: Array | None, overlap: 
         "reference_frame": np.zeros((f, u), np.int32),
         "boundary": np.zeros(u, np.bool_),
         "fringes": np.full((f, u), np.nan),
-        "given_id": np.tile(tracks.id.max() + 1 + np.arange(u), (f, 1)),
+        "given_id": np.tile(ids, (f, 1)),
     }
     given = {each.name: getattr(tracks, each.name) for each in fields(tracks)}
     extended = {
