@@ -40,6 +40,7 @@ MEASURES: dict[str, Callable[[Evidence], float]] = {
     # without a load: boundary grains, whose forces satisfy no balance, leave more of the others open
     "undetermined": lambda e: e.information.undetermined,
     "noise": lambda e: e.information.noise / e.information.diameter,
+    "few_interior": lambda e: 1.0 / max(e.interior, 1.0),
 }
 # Where nothing slides, these are small for want of motion, which is no evidence for the forces: estimates that know the
 # balance of forces alone agree, too.

@@ -21,7 +21,7 @@ SOFT_CHAIN_LOSS = 0.15  # where a single chain treats soft grains as hard
 BEYOND_WALL_LOSS = 12.0  # for each grain beyond a wall, per grain
 FEW_PHOTOGRAPHS, TRUST_OF_FEW = 3, 0.28  # of a test, below which the trust is at most the second
 LEFT_BY_INTERVALS = 2.5, 0.4  # of `most_by_intervals`
-LITTLE_KNOWN = frozenset({"undetermined", "noise"})  # measures that contradict nothing
+LITTLE_KNOWN = frozenset({"undetermined", "noise", "few_interior"})  # measures that contradict nothing
 REPORTED = 0.04  # fraction of the trust above which a penalty is reported in words
 
 
@@ -212,6 +212,8 @@ def _contradictions(evidence: Evidence) -> list[Penalty]:
         "forces open: photograph the walls, and state the load on one",
         "noise": f"a noise of {1e6 * found.noise:.3g} µm hides overlaps, and no load is known: state one, or measure "
         "positions more exactly",
+        "few_interior": f"no load is known, and only {evidence.interior:g} grains have neighbours all around: photograph "
+        "a larger part of the packing, or its walls",
         "force_change": f"{100.0 * evidence.force_change:.0f} % of the force pattern is new{coarse}",
     }
     return [

@@ -53,7 +53,7 @@ SOFT = 1.9e6  # [N/m] stiffness of contacts below which overlaps are forces
 SETTLED_SCALE = 3  # first photograph whose scale is judged
 SETTLED = 2  # first photograph of a trial solution that is judged
 FOLDS = 6  # groups of kinds that are left out in turn
-ONLY_UNLOADED = "undetermined", "noise"
+ONLY_UNLOADED = "undetermined", "noise", "few_interior"
 # The fits, each with the measures that it weighs.
 FITS: dict[str, tuple[str, ...]] = {
     "both": tuple(name for name in MEASURES if name not in ONLY_UNLOADED),
@@ -81,6 +81,7 @@ RANGES = {
     "power_gap": (0.01, 1.5), "disagreement_of_positions": (0.003, 1.0), "hidden_sliding": (0.03, 10.0),
     "load_mismatch": (0.02, 2.0), "force_residual": (0.002, 0.5), "inertial_number": (1e-3, 0.1),
     "coarse_step": (0.004, 0.02), "undetermined": (0.02, 0.5), "noise": (1e-4, 5e-3),
+    "few_interior": (3e-3, 0.05),
 }  # fmt: skip
 
 

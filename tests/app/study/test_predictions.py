@@ -71,6 +71,7 @@ def test_the_weightiest_reason_is_stated():
 def test_data_that_show_little_without_a_load_cannot_carry_forces():
     little = replace(
         SOUND, loaded=False, agreement=0.3, overlap_agreement=0.3, disagreement=0.9, position_agreement=0.6,
+        interior=25, correction=0.3,
         information=replace(SOUND.information, noise=7e-5, diameter=0.02, undetermined=0.45),
     )  # fmt: skip
     assert Trial((little,), 1).expected[0] < prediction.POOR

@@ -265,7 +265,7 @@ MUTANTS = [
         ("contradicted=contradicted))", "contradicted=False))"),
         ("if not math.isnan(each.disagreement)]\n        if not found:", "]\n        if not found:"),
         ("if not math.isnan(each.disagreement)]\n        return float", "]\n        return float"),
-        ("return max(found).words", "return min(found).words"),
+        ("return max((each for evidence", "return min((each for evidence"),
     ),
     *mutants_of(
         "app/inference/diagnosis/trial.py",

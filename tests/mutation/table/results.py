@@ -11,6 +11,13 @@ COMPARISON = "tests/app/results/test_comparison.py"
 
 MUTANTS = [
     *mutants_of(
+        "app/results/truth.py",
+        "tests/app/results/test_truth_names.py",
+        ("bodies[k if 0 <= k < len(bodies) else 0]", "bodies[0]"),
+        ("tracks.id if tracks.given_id is None else tracks.given_id", "tracks.id"),
+        ("wall = {name: ids.shape[-1] + row", "wall = {name: len(ids) + row"),
+    ),
+    *mutants_of(
         "app/results/hdf5/frame_pieces.py",
         STORE,
         ("ends[path].append(ends[path][-1] + len(piece[counted]))", "ends[path].append(ends[path][-1] + 1)"),

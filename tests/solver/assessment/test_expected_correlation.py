@@ -167,16 +167,27 @@ def test_gaps_that_were_closed_count_where_forces_rest_on_them_and_nothing_slide
     assert losses(closed)["closed_overlap"] > 0.1
 
 
-def test_without_a_load_forces_that_balance_leaves_open_lower_the_trust():
+WELL_KNOWN = replace(
+    BOTH, interior=300, information=replace(BOTH.information, undetermined=0.05, noise=5e-6, diameter=0.02)
+)
+
+
+@pytest.mark.parametrize(
+    "little",
+    [
+        replace(WELL_KNOWN, information=replace(WELL_KNOWN.information, undetermined=0.4)),
+        replace(WELL_KNOWN, information=replace(WELL_KNOWN.information, noise=6e-5)),
+        replace(WELL_KNOWN, interior=22),
+    ],
+    ids=["balance leaves more open", "more noise", "few rods inside"],
+)
+def test_without_a_load_what_shows_little_lowers_the_trust(little):
     """A packing whose outermost rods stand for its walls has the evidence of others, and less accurate forces."""
-    few, many = (
-        replace(BOTH, loaded=False, information=replace(BOTH.information, undetermined=each)) for each in (0.05, 0.4)
-    )
-    assert bound_correlation(many) < bound_correlation(few)
-    assert predict_correlation([many]) < predict_correlation([few])
-    under_load = replace(many, loaded=True)
-    assert bound_correlation(under_load) == bound_correlation(replace(few, loaded=True))
-    assert predict_correlation([under_load]) == predict_correlation([replace(few, loaded=True)])
+    well, little_known = (replace(each, loaded=False) for each in (WELL_KNOWN, little))
+    assert bound_correlation(little_known) < bound_correlation(well)
+    assert predict_correlation([little_known]) < predict_correlation([well])
+    assert bound_correlation(little) == bound_correlation(WELL_KNOWN)
+    assert predict_correlation([little]) == predict_correlation([WELL_KNOWN])
 
 
 def test_one_photograph_without_a_load_makes_a_prediction_without_one():

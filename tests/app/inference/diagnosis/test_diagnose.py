@@ -97,7 +97,9 @@ def test_without_a_clear_winner_nothing_is_blamed(scores, rises):
 
 
 def test_data_that_show_little_contradict_nothing(scores):
-    still = replace(SOUND, loaded=False, agreement=0.5, overlap_agreement=0.5, disagreement=0.9, position_agreement=0.7)
+    still = replace(
+        SOUND, loaded=False, agreement=0.5, overlap_agreement=0.5, disagreement=0.9, position_agreement=0.7, interior=25
+    )
     hidden = replace(still, information=replace(still.information, noise=5e-5, diameter=0.02, undetermined=0.4))
     trial = Trial((hidden,), 1)
     assert trial.expected[0] < module.UNEXPLAINED
