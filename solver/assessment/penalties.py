@@ -212,8 +212,8 @@ def _contradictions(evidence: Evidence) -> list[Penalty]:
         "forces open: photograph the walls, and state the load on one",
         "noise": f"a noise of {1e6 * found.noise:.3g} µm hides overlaps, and no load is known: state one, or measure "
         "positions more exactly",
-        "few_interior": f"no load is known, and only {evidence.interior:g} grains have neighbours all around: photograph "
-        "a larger part of the packing, or its walls",
+        "few_interior": f"no load is known, and only {evidence.interior:g} grains have neighbours all around: "
+        "photograph a larger part of the packing, or its walls",
         "force_change": f"{100.0 * evidence.force_change:.0f} % of the force pattern is new{coarse}",
     }
     return [
