@@ -64,6 +64,13 @@ MUTANTS = [
         ("if not frame.has_weight:", "if frame.has_weight:"),
     ),
     *mutants_of(
+        "solver/sequence/estimate.py",
+        "tests/solver/sequence/test_mixed_total.py",
+        ("weight = evident_position_weight(evidence) if hard else None", "weight = None"),
+        ("hard = not (problem.settings.soft or", "hard = not ("),
+        ("loaded=packing.is_loaded,", ""),
+    ),
+    *mutants_of(
         "app/study/scenarios/mixture_fit.py",
         "tests/app/study/test_mixture_fit.py",
         ("best - r + PRICE", "r - best + PRICE"),
