@@ -143,6 +143,8 @@ def study(
     chosen = (*settings, "solver.estimator=nlgs") if subject == "worlds" and estimator == "nlgs" else settings
     plan = StudyPlan(GRAINS if grains is None else grains, out / "worlds", chosen, frozenset(varied))
     request = _StudyRequest(plan, scenarios, seeds, out, quiet)
+    if unused := sorted(set(varied) - {*seeds, *fit}):
+        raise InputError("--varied", " ".join(map(str, unused)), "is neither one of --seeds nor of --fit")
     if subject == "report" and frame is None:
         return _study_report(request, page, as_json=as_json)
     for option, value in (("--page", page), ("--frame", frame)):
@@ -155,9 +157,7 @@ def study(
     if subject == "perturbation":
         return _study_perturbation(folder, request)
     if folder is not None:
-        raise InputError(
-            "study", f"{folder} with {subject}", "a path applies to real, perturbation and paper --program"
-        )
+        raise InputError("study", f"{folder} with {subject}", "a path applies to real, perturbation, paper --program")
     if subject == "worlds":
         return _study_worlds(request, jobs=jobs, as_json=as_json)
     if subject == "trust":

@@ -135,6 +135,7 @@ def test_scenarios_without_a_loaded_plate_have_no_known_scale() -> None:
     [
         (("study", "worlds", "--jobs", "0"), "--jobs: 0"),
         (("study", "paper", "--worlds", "shear"), "--worlds with paper"),
+        (("study", "trust", "--seeds", "1", "--varied", "1", "62"), "--varied: 62: is neither"),
         (("study", "paper", "--json"), "--json with paper"),
         (("synth", "OUT", "--preset", "camera"), "--preset camera: makes tracks"),
         (("synth", "OUT", "--preset", "camera", "--no-photographs", "--reversal"), "--reversal with preset camera"),
