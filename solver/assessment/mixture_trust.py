@@ -29,6 +29,7 @@ LEAST_WEIGHT: float = FITTED["position_weight"]["least"]  # weights below it are
 # reliability of LOW or less is taken as the expectation itself.
 MEAN_ERROR_FRACTION = 0.45
 LOW, SOUND = 0.6, 0.85
+ALIKE = 0.5  # weight of either estimate
 MAX_TRUST_CORRECTED = 0.9  # errors of centres and radii were separated from overlaps; r .87 to .98
 
 
@@ -158,7 +159,12 @@ def evident_position_weight(evidence: Evidence) -> float:
         w = 1/(1 + exp(−s)) in (0, 1), with a from fitted.toml, others of grains without a known load, and
         s = a_0 + a_1 ln ε + a_2 ln(1 − c) + a_3 ln p + a_4 ln D + a_5 (arctanh c − arctanh d)
             + a_6 ln h + a_7 ln u + a_8 arctanh b.
+
+    Errors of single grains that were corrected change gaps as forces do, which makes positions less certain in a way
+    that none of these measures shows: without a known load both estimates then count alike.
     """
+    if evidence.corrected_gap > 0.0 and not evidence.loaded:
+        return ALIKE
     score = float(position_weight_terms(evidence) @ weight_coefficients(loaded=evidence.loaded))
     return 1.0 / (1.0 + math.exp(-score))
 

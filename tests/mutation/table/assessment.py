@@ -92,6 +92,7 @@ MUTANTS = [
         "solver/assessment/mixture_trust.py",
         MIXTURE_TRUST,
         ("sure * (1.0 - MEAN_ERROR_FRACTION)", "sure * MEAN_ERROR_FRACTION"),
+        ("if evidence.corrected_gap > 0.0 and not evidence.loaded:", "if evidence.corrected_gap > 0.0:"),
         ("(reliability - LOW) / (SOUND - LOW)", "reliability / SOUND"),
         ("logarithm(1.0 - evidence.position_agreement", "-logarithm(1.0 - evidence.position_agreement"),
         ("math.log(min(max(default if math.isnan(value) else value, low), high))", "math.log(max(value, 1e-9))"),

@@ -132,3 +132,12 @@ def test_without_a_load_positions_have_a_weight_of_their_own():
         score = position_weight_terms(each) @ weight_coefficients(loaded=each.loaded)
         assert evident_position_weight(each) == pytest.approx(1.0 / (1.0 + math.exp(-score)))
     assert evident_position_weight(without) != pytest.approx(evident_position_weight(given), abs=0.01)
+
+
+def test_without_a_load_corrected_errors_of_grains_make_both_estimates_count_alike():
+    given = replace(SOUND, correction=0.1, position_agreement=0.9, agreement=0.3, overlap_agreement=0.2, power_gap=0.2)
+    corrected = replace(given, loaded=False, corrected_gap=5e-5)
+    assert evident_position_weight(corrected) == 0.5
+    assert evident_position_weight(replace(corrected, corrected_gap=0.0)) > 0.6
+    loaded = replace(corrected, loaded=True)
+    assert evident_position_weight(loaded) == evident_position_weight(replace(loaded, corrected_gap=0.0)) != 0.5
