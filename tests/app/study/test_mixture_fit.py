@@ -51,7 +51,7 @@ def test_a_fit_takes_little_from_a_kind_that_the_present_weights_serve_best() ->
 
 @pytest.mark.slow
 def test_mixtures_are_those_of_a_run(tmp_path) -> None:
-    made = make_scenario(tmp_path, "smooth_walls", 3, grains=60)
+    made = make_scenario(tmp_path, "theta_sign", 3, grains=60)
     alone = solve_scenario(load_experiment(made.folder, ALONE), no_progress)
     mixed = solve_scenario(load_experiment(made.folder), no_progress)
     sequence, compared = alone.sequence, 0
