@@ -190,28 +190,23 @@ class Tracks:
     def frames(self, start: int, stop: int, step: int = 1) -> Tracks:
         """Return every step-th of the frames start … stop − 1."""
         part = slice(start, stop, step)
-        return Tracks(
-            self.id, self.radius, self.time[part], self.position[part], self.rotation[part],
-            self.sigma[part], self.zncc[part], self.status[part], self.centre_sigma,
-            None if self.second_zncc is None else self.second_zncc[part],
-            None if self.reference_frame is None else self.reference_frame[part],
-            None if self.failed_reason is None else self.failed_reason[part],
-            self.inferred, self.boundary, None if self.fringes is None else self.fringes[part],
-            None if self.given_id is None else self.given_id[part],
-        )  # fmt: skip
+        return replace(self, **{name: values[part] for name, values in self._with_dims("frame").items()})
 
     def rearranged(self, row: NDArray[np.int64]) -> Tracks:
         """Return the tracks with the poses of frame k that the rows `row[k]` (f, n) hold now."""
-        poses = {
-            each.name: values
-            for each in quantities(Tracks)
-            if each.quantity.dims.startswith("frame grain") and (values := getattr(self, each.name)) is not None
-        }
         taken = {
             name: np.take_along_axis(values, row.reshape(*row.shape, *[1] * (values.ndim - 2)), axis=1)
-            for name, values in poses.items()
+            for name, values in self._with_dims("frame grain").items()
         }
         return replace(self, **taken)
+
+    def _with_dims(self, first: str) -> dict[str, Any]:
+        """Values of the fields that there are and whose dimensions begin so, by name."""
+        return {
+            each.name: values
+            for each in quantities(Tracks)
+            if each.quantity.dims.startswith(first) and (values := getattr(self, each.name)) is not None
+        }
 
 
 def held_once(column: NDArray[Any]) -> NDArray[Any]:

@@ -22,6 +22,7 @@ from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts
 from ..contacts.kinematics import relative_motion
 from ..detection.displacement import displacement_scale
+from ..statistics.force_statistics import mean_normal_force
 
 DETECTABLE = 3.0  # standard deviations of a measured sliding beyond which it is detected
 STRONG = 0.5  # of the mean force: contacts that surely touch
@@ -120,8 +121,7 @@ def undetermined_fraction(contacts: Contacts, fn: Array, balanced: NDArray[np.bo
         1 − 3 m/(2 c), c the contacts that hold grains and m the balanced grains that they touch: f_n and f_t of every
         contact against ΣF_x, ΣF_y and ΣM of every grain. NaN without such a contact.
     """
-    bearing = fn > 0.0
-    holding = fn > LOOSE * fn[bearing].mean() if bearing.any() else bearing
+    holding = fn > LOOSE * mean_normal_force(fn)
     count = int(holding.sum())
     touched = np.zeros(len(balanced), np.bool_)
     touched[contacts.i[holding]] = True
@@ -165,8 +165,7 @@ class _StrongGaps(NamedTuple):
 
 
 def _strong_gaps(contacts: Contacts, fn: Array) -> _StrongGaps:
-    bearing = fn > 0.0
-    strong = fn > STRONG * fn[bearing].mean() if bearing.any() else bearing
+    strong = fn > STRONG * mean_normal_force(fn)
     return _StrongGaps(contacts.gap[strong], fn[strong], contacts.with_wall[strong])
 
 

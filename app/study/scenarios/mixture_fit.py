@@ -26,9 +26,9 @@ from ...process.progress import Progress, no_progress
 from ...solver.assessment.mixture_trust import (
     LEAST_WEIGHT,
     WEIGHT_TERMS,
+    evident_position_weight,
     motion_reliability,
     position_weight_terms,
-    weight_coefficients,
 )
 from ...solver.baselines.motion_free import overlap_balance
 from ...solver.bodies.grains import Array
@@ -66,13 +66,15 @@ class MixtureSample:
     terms: Array  # (f, t) of the logarithm of w/(1 − w)
     r: Array  # (f, 7) correlation of the mixture of every weight with the truth; of weight 0 the motion estimate
     positions: Array  # (f,) correlation of the position-only estimate, on contacts of its own
+    weight: Array  # (f,) of the position-only estimate in a run
     loaded: bool = True  # see `Packing.is_loaded`: coefficients differ
 
     def select(self, chosen: NDArray[np.bool_]) -> MixtureSample:
         """The chosen frames (f,)."""
         return replace(
-            self, kind=self.kind[chosen], terms=self.terms[chosen], r=self.r[chosen], positions=self.positions[chosen]
-        )
+            self, kind=self.kind[chosen], terms=self.terms[chosen], r=self.r[chosen], positions=self.positions[chosen],
+            weight=self.weight[chosen],
+        )  # fmt: skip
 
     def reached(self, weight: Array) -> Array:
         """Correlation (f,) of the mixtures of these weights (f,)."""
@@ -92,7 +94,7 @@ def sample_mixtures(
     Returns the frames under a known load and those without, where there are any.
     """
     motion = replace(plan, settings=(*plan.settings, *ALONE))
-    found: dict[bool, list[tuple[str, Array, Array, float]]] = {True: [], False: []}
+    found: dict[bool, list[tuple[str, Array, Array, float, float]]] = {True: [], False: []}
     cases: list[tuple[ScenarioName, int]] = [(name, seed) for name in scenarios for seed in seeds]
     for done, (name, seed) in enumerate(cases):
         progress("mixtures", done, len(cases))
@@ -174,13 +176,12 @@ def print_mixture(console: Console, sample: MixtureSample) -> None:
 
 
 def _mixed(sample: MixtureSample) -> Array:
-    """Return the correlations (f,) of the mixtures of a run, with the weights of fitted.toml."""
-    weight = expit(sample.terms @ weight_coefficients(loaded=sample.loaded))
-    return sample.reached(np.where(weight < LEAST_WEIGHT, 0.0, weight))
+    """Return the correlations (f,) of the mixtures of a run."""
+    return sample.reached(np.where(sample.weight < LEAST_WEIGHT, 0.0, sample.weight))
 
 
 def _print_kinds(console: Console, sample: MixtureSample) -> None:
-    """Print the mean r of both parts and of their mixture with the weights of fitted.toml, of every kind."""
+    """Print the mean r of both parts and of their mixture in a run, of every kind."""
     mixed = _mixed(sample)
     rows, worse = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0)), []
     for heading in ("kind", "motion", "positions", "mixture", "loss against the better"):
@@ -201,8 +202,10 @@ def _print_kinds(console: Console, sample: MixtureSample) -> None:
     )  # fmt: skip
 
 
-def _mix_frames(solution: ScenarioSolution, true: Sequence[tuple[Keys, Array]]) -> list[tuple[Array, Array, float]]:
-    """Terms (t,) and correlations (7,) of the frames of hard grains, and of positions alone."""
+def _mix_frames(
+    solution: ScenarioSolution, true: Sequence[tuple[Keys, Array]]
+) -> list[tuple[Array, Array, float, float]]:
+    """Terms (t,) and correlations (7,) of frames of hard grains, that of positions alone, and their weight in a run."""
     sequence, found = solution.sequence, []
     estimates = PositionEstimates(sequence.packing, sequence.snapshots, sequence.settings.posterior, 1)
     for k in range(FIRST, len(solution.unchecked), STRIDE):
@@ -221,7 +224,8 @@ def _mix_frames(solution: ScenarioSolution, true: Sequence[tuple[Keys, Array]]) 
         truth = true[k][0], true[k][1][:, 0]
         fields = [frame.fn, *mixed_forces(sequence, frame, positions, motion_reliability(evidence), WEIGHTS[1:])]
         r = np.array([_correlate((frame.contacts.key, fn), truth) for fn in fields])
-        found.append((position_weight_terms(evidence), r, _correlate(geometry, truth)))
+        alone = _correlate(geometry, truth)
+        found.append((position_weight_terms(evidence), r, alone, evident_position_weight(evidence)))
     return found
 
 

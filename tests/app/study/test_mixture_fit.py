@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment
 from rodsight.process.progress import no_progress
-from rodsight.solver.assessment.fitted import FITTED
-from rodsight.solver.assessment.mixture_trust import WEIGHT_TERMS, motion_reliability
+from rodsight.solver.assessment.mixture_trust import WEIGHT_TERMS, motion_reliability, weight_coefficients
 from rodsight.solver.mixture.position_estimates import PositionEstimates
 from rodsight.study.scenarios.mixture_fit import ALONE, WEIGHTS, MixtureSample, fit_weight, mixed_forces
 from rodsight.study.scenarios.scenario_score import solve_scenario
@@ -15,6 +14,7 @@ from rodsight.synthetic.scenarios.scenario_folder import make_scenario
 from scipy.special import expit
 
 COUNT = 240
+PRESENT = weight_coefficients(loaded=True)
 
 
 def _sample(seed: int) -> tuple[MixtureSample, np.ndarray]:
@@ -24,7 +24,8 @@ def _sample(seed: int) -> tuple[MixtureSample, np.ndarray]:
     terms[:, 0] = 1.0
     best = expit(0.5 + 1.5 * (terms[:, 1] - 2.0) - (terms[:, 3] - 2.0))
     r = 0.97 - 0.2 * (WEIGHTS - best[:, None]) ** 2
-    return MixtureSample(np.where(rng.random(COUNT) < 0.5, "shear", "biaxial"), terms, r, r[:, -1]), best
+    kind, present = np.where(rng.random(COUNT) < 0.5, "shear", "biaxial"), expit(terms @ PRESENT)
+    return MixtureSample(kind, terms, r, r[:, -1], present), best
 
 
 @pytest.mark.slow
@@ -38,14 +39,13 @@ def test_the_fitted_weight_is_the_best_one_on_frames_that_were_not_fitted() -> N
 
 @pytest.mark.slow
 def test_a_fit_takes_little_from_a_kind_that_the_present_weights_serve_best() -> None:
-    rng, table = np.random.default_rng(3), FITTED["position_weight"]
-    present = np.array([table[name] for name in WEIGHT_TERMS])
+    rng, present = np.random.default_rng(3), PRESENT
     terms = rng.normal(0.0, 0.01, (COUNT, len(present)))
     terms[:, 0], terms[:, 1] = 1.0, terms[:, 1] - present[0] / present[1]  # present weights of about one half
     kind = np.array(["shear", "biaxial", "gravity"])[np.arange(COUNT) % 3]
     best = np.where(kind == "shear", expit(terms @ present), 1.0)
     r = 0.97 - 0.2 * (WEIGHTS - best[:, None]) ** 2
-    weight = expit(terms @ fit_weight(MixtureSample(kind, terms, r, np.zeros(COUNT))))
+    weight = expit(terms @ fit_weight(MixtureSample(kind, terms, r, np.zeros(COUNT), expit(terms @ present))))
     assert 0.55 < weight.mean() < 0.7  # 5/6 if every kind counted the same
 
 

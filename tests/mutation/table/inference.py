@@ -48,7 +48,7 @@ MUTANTS = [
     *mutants_of(
         "app/tracks.py",
         OUTLIERS,
-        ('each.quantity.dims.startswith("frame grain")', 'each.quantity.dims == "frame grain xy"'),
+        ('self._with_dims("frame grain")', 'self._with_dims("frame grain xy")'),
         ("axis=1)\n            for name, values", "axis=0)\n            for name, values"),
     ),
     *mutants_of(
