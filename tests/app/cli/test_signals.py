@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import queue
 import signal
 import subprocess
 import sys
@@ -69,6 +70,49 @@ def test_a_signal_while_modules_are_imported_is_one_line(module, number):
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout) == (ENDS[number], "")
     assert done.stderr == "rodsight: interrupted; the same command resumes from here\n"
+
+
+# A lock as those of Python's threads, which receives a signal between the steps of its change.
+INTERRUPTED_LOCK = """
+class Interrupted:
+    held = False
+    def __enter__(self):
+        self.held = True
+        os.kill(os.getpid(), number)
+        for _ in range(1000):
+            pass
+        return self
+    def __exit__(self, *_):
+        self.held = False
+def wait(gate):
+    os.kill(os.getpid(), number)
+    gate.get()
+"""
+
+
+@pytest.mark.parametrize("number", ENDS, ids=lambda number: number.name)
+def test_a_signal_leaves_no_lock_held(number):
+    names: dict = {"os": os, "number": number}
+    exec(compile(INTERRUPTED_LOCK, threading.__file__, "exec"), names)  # as one of these modules
+    lock, further = names["Interrupted"](), []
+
+    def work() -> None:
+        with stop_on_signals():
+            with lock:
+                further.append("changed")
+            threading.Event().wait(20.0)
+
+    with pytest.raises(Stopped) as stopped:
+        work()
+    assert not lock.held
+    assert stopped.value.number == number
+
+
+def test_a_wait_for_threads_is_interrupted():
+    names: dict = {"os": os, "number": signal.SIGTERM}
+    exec(compile(INTERRUPTED_LOCK, threading.__file__, "exec"), names)
+    with pytest.raises(Stopped), stop_on_signals():
+        names["wait"](queue.SimpleQueue())
 
 
 def test_an_ignored_signal_stays_ignored():
