@@ -316,6 +316,10 @@ class WallTracks:
         measured = False if self.load is None else np.isfinite(self.load).any(axis=0)
         return np.isfinite(self.pressure) | measured
 
+    def force_unit(self, weight: Array) -> str:
+        """Return the unit of forces: arbitrary where neither a load nor the weight (n, 2) [N] sets their scale."""
+        return "N" if self.loaded.any() or weight.any() else "a.u."
+
     def outlines(self, frame: int) -> list[Array]:
         """Return the lines (p, 2) [m] that draw the walls of a frame."""
         return outlines(self.endpoints[frame], self.side)

@@ -183,7 +183,12 @@ class FrameForces:
         return np.nan_to_num(self.bearing_probability)
 
     def scaled(self, factor: float) -> FrameForces:
-        """The same with all reported forces and their standard deviations multiplied."""
+        """The same with all forces and their standard deviations multiplied, those of sweeps and members included."""
+        history = replace(
+            self.history, fn=np.float32(factor) * self.history.fn, ft=np.float32(factor) * self.history.ft
+        )  # fmt: skip
         return replace(
-            self, fn=factor * self.fn, ft=factor * self.ft, fn_sd=factor * self.fn_sd, ft_sd=factor * self.ft_sd
-        )
+            self, fn=factor * self.fn, ft=factor * self.ft, fn_sd=factor * self.fn_sd, ft_sd=factor * self.ft_sd,
+            nlgs_fn=factor * self.nlgs_fn, nlgs_ft=factor * self.nlgs_ft, history=history,
+            member_force=None if self.member_force is None else factor * self.member_force,
+        )  # fmt: skip

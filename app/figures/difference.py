@@ -70,5 +70,5 @@ def _add_key(axes: Axes, base: Results, top: float, names: tuple[str, str]) -> N
     for place, colour, name in ((0.36, MORE, names[0]), (0.76, LESS, names[1])):
         left = x0 + place * width
         axes.plot([left, left + length], [y, y], color=colour, linewidth=wide, solid_capstyle="butt", zorder=8)
-        text = f"{name} more by {0.5 * top:.3g} N"
+        text = f"{name} more by {0.5 * top:.3g} {base.force_unit}"
         axes.text(left + 0.5 * length, y - 0.022 * width, text, fontsize=6.0, va="top", ha="center", zorder=9)

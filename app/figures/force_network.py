@@ -56,7 +56,7 @@ def draw_forces(results: Results, frame: int, width: Width) -> Figure:
         ScalarMappable(Normalize(0.0, force_range.top), colours), ax=axes, shrink=0.75, aspect=30, pad=0.02,
         extend="max",
     )  # fmt: skip
-    bar.set_label("normal force f$_n$ [N]")
+    bar.set_label(f"normal force f$_n$ [{results.force_unit}]")
     return figure
 
 
@@ -143,7 +143,7 @@ def _add_key(axes: Axes, results: Results, force_range: ForceRange) -> None:
     ))  # fmt: skip
     _add_gaps(axes, lines, np.array([relative for relative, _ in KEY]), wide, _radius(results), 9.0)
     for left, (_, label) in zip(start, KEY, strict=True):
-        text = label or f"{force:g} N"
+        text = label or f"{force:g} {results.force_unit}"
         axes.text(left + 0.5 * length, y - 0.022 * width, text, fontsize=6.0, va="top", ha="center", zorder=9)
     x = x0 + 0.93 * width
     axes.plot([x], [y], "o", markersize=3.0, mfc="white", mec=BLUE, mew=0.5, zorder=9)

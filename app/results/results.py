@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -98,6 +99,17 @@ class Results:
             return self.read_kinematics.of_frames(frames)
         whole = self.kinematics
         return None if whole is None else whole.of_frames(frames)
+
+    @property
+    def weight(self) -> Array:
+        """Weight of every grain (n, 2) [N], from `material.gravity` of the configuration."""
+        x, y = tomllib.loads(self.configuration).get("material", {}).get("gravity", (0.0, 0.0))
+        return self.grains.weight((float(x), float(y)))
+
+    @property
+    def force_unit(self) -> str:
+        """Unit of the forces, see `WallTracks.force_unit`."""
+        return self.walls.force_unit(self.weight)
 
     def contact_friction(self, frame: int) -> Array:
         """Coefficient of friction used at every contact of a frame (c,); files of earlier versions hold one for all."""

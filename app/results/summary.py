@@ -95,7 +95,7 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
     trust = np.array([frame.trust for frame in frames])
     solved = [frame for frame in frames if frame.status is not FrameStatus.FAILED]
     worst = max(solved or frames, key=lambda frame: frame.unbalance)
-    weight = _weight(results)
+    weight = results.weight.sum(axis=0)
     summary: dict[str, Any] = {
         "name": results.name,
         "frame_count": len(frames),
@@ -236,12 +236,6 @@ def _loads(results: Results) -> list[dict[str, Any]]:
         elif np.isfinite(pressure) and length is not None:
             found.append(known | {"pressure": pressure, "force": pressure * float(width[w]) * length})
     return found
-
-
-def _weight(results: Results) -> Float[np.ndarray, "2"]:
-    """Return the weight of all rods [N]; zero without gravity."""
-    x, y = _material(results).get("gravity", (0.0, 0.0))
-    return results.grains.weight((float(x), float(y))).sum(axis=0)
 
 
 def press_from_above(

@@ -17,6 +17,7 @@ from ..detection.touch_probability import window_of
 from ..frame_forces import FrameForces, FrameStatus
 from ..nlgs.force_memory import ForceMemory
 from ..statistics.agreement import relative_change
+from ..statistics.force_statistics import mean_normal_force
 from .estimate import Estimate, estimate_frame, mean_stress
 from .frame_problem import FrameProblem, SequenceProblem
 from .frame_report import find_ages, report_frame
@@ -66,6 +67,9 @@ def solve_frame(problem: FrameProblem, state: SequenceState) -> tuple[FrameForce
     ages = find_ages(estimate.contacts, state)
     frame, evidence = report_frame(problem, estimate, evidence, decision, ages)
     frame = _compare_with_former(problem, replace(frame, frames_since_reset=since_reset), state)
+    mean = mean_normal_force(frame.fn)
+    if problem.scale_is_open and mean > 0.0:  # that of the chain differs from frame to frame without a cause
+        frame = frame.scaled(1.0 / mean)
     pressure = mean_stress(problem, estimate) if problem.motion.ends_here else np.nan
     return frame, SequenceState(
         members=estimate.members,

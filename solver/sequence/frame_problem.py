@@ -60,6 +60,11 @@ class FrameProblem:
         return self.settings.soft and not self.packing.scale_is_known
 
     @property
+    def scale_is_open(self) -> bool:
+        """Whether nothing shows the scale of the forces, nor how it changes from frame to frame."""
+        return not (self.packing.scale_is_known or self.settings.soft or self.snapshot.fringes is not None)
+
+    @property
     def walls(self) -> Walls:
         """The walls at the frame, at rest and under their loads."""
         return self.packing.walls_of(self.snapshot)

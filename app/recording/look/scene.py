@@ -52,6 +52,11 @@ class Scene:
         return float(length) if isinstance(length, (int, float)) and length > 0 else USUAL_ROD_LENGTH
 
     @property
+    def force_unit(self) -> str:
+        """Unit of the forces, see `WallTracks.force_unit`."""
+        return self.walls.force_unit(self.weight)
+
+    @property
     def weight(self) -> Array:
         """Weight of every grain (n, 2) [N], from `material.gravity` of the configuration; zero if that is not set."""
         gravity = setting(self.configuration, "material", "gravity")

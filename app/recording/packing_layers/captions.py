@@ -53,7 +53,7 @@ def write_card(scene: Scene, forces: FrameForces, statistics: FrameStatistics, t
         f"φ {angle:.1f}°" + (f" ± {angle_sd:.1f}°" if _known(angle_sd) else ""),
         f"z {statistics.coordination_number:.2f}",
         f"{statistics.contact_count} contacts",
-        f"mean f_n {statistics.mean_fn:.3g} N",
+        f"mean f_n {statistics.mean_fn:.3g} {scene.force_unit}",
         f"scale of all forces ± {100.0 * forces.scale_sd:.0f} %" if _known(forces.scale_sd) else "",
     ]
     reasons = [] if forces.status is FrameStatus.SETTLED else [each.strip() for each in forces.reason.split(";")]

@@ -27,8 +27,9 @@ COLUMNS, ROWS = 3, 3  # of frames
 SWEEP_COLUMNS = 2  # of sweeps, in ROWS rows
 PICTURES = COLUMNS * ROWS  # greatest number of frames
 SWEEP_PICTURES = SWEEP_COLUMNS * ROWS  # greatest number of sweeps, including the reported field
-STEP_DOWN = 1.45  # distance of rows over the height of a picture, with space for a name
-LINE_HEIGHT = 0.1  # of the height of a picture: from line to line above it
+STEP_DOWN = 1.6  # distance of rows over the height of a picture, with space for a name
+NAME_WIDTH = {COLUMNS: 1.5, SWEEP_COLUMNS: 0.7}  # of the height of a picture: the least distance of columns
+LINE_HEIGHT = 0.16  # of the height of a picture: from line to line above it
 KEY_HEIGHT = 0.22  # of the height of a picture: the strip below all of them, for the legend
 LONGEST_JOIN = 4.0  # mean radii between the ends of two walls that are joined
 STRONG = 1.0  # times the mean f_n of the run: the least force drawn in pictures of frames
@@ -44,10 +45,15 @@ def film_bounds(canvas: Canvas, columns: int) -> tuple[tuple[float, float], tupl
     """Return the bounds of a film with this number of columns, in x and y [px]."""
     above = (STEP_DOWN - 1.0) * canvas.height
     top = canvas.top - above
-    return (canvas.left, canvas.left + columns * canvas.width), (
+    return (canvas.left, canvas.left + columns * step_across(canvas, columns)), (
         top,
         top + (ROWS * STEP_DOWN + KEY_HEIGHT) * canvas.height,
     )
+
+
+def step_across(canvas: Canvas, columns: int) -> float:
+    """Return the distance of the columns of a film [px], with space for the names of narrow pictures."""
+    return max(canvas.width, NAME_WIDTH[columns] * canvas.height)
 
 
 def film_caption(forces: FrameForces, time: float) -> list[str]:
@@ -67,7 +73,7 @@ class FilmWriter:
         """Log the legend of forces and a scale bar, which hold for all pictures, below both films, static."""
         canvas, style = self._scene.canvas, self._scene.style
         for path, columns in ((entities.FILM_KEY, COLUMNS), (entities.FILM_SWEEPS_KEY, SWEEP_COLUMNS)):
-            wide = columns * canvas.width
+            wide = columns * step_across(canvas, columns)
             x = canvas.left + np.linspace(0.25, 0.75, PIECES + 1) * wide
             y = np.full(PIECES, canvas.top + ((ROWS - 1) * STEP_DOWN + 1.0 + 0.3 * KEY_HEIGHT) * canvas.height)
             lines = np.stack([np.stack([x[:-1], y], axis=1), np.stack([x[1:], y], axis=1)], axis=1)
@@ -83,7 +89,8 @@ class FilmWriter:
                 ),
                 static=True,
             )
-            texts = (("0", x[0]), (f"≥ {style.range.top:.3g} N", x[-1]), (label, float(bar[:, 0].mean())))
+            top = f"≥ {style.range.top:.3g} {self._scene.force_unit}"
+            texts = (("0", x[0]), (top, x[-1]), (label, float(bar[:, 0].mean())))
             log_texts(stream, f"{path}/ticks", [(np.array([at, y[0]]), text, INK) for text, at in texts])
 
     def log(self, clock: Clock, forces: FrameForces) -> None:
@@ -126,7 +133,9 @@ class FilmWriter:
         """Return the offsets of pictures (k,) from the first (k, 2) [px]."""
         canvas = self._scene.canvas
         row, column = np.divmod(pictures, columns)
-        return np.column_stack([column * canvas.width, row * STEP_DOWN * canvas.height])
+        beside = 0.5 * (step_across(canvas, columns) - canvas.width)
+        across = beside + column * step_across(canvas, columns)
+        return np.column_stack([across, row * STEP_DOWN * canvas.height])
 
     def _lines(self, forces: FrameForces, fn: NDArray[np.floating], at: Array, strong: float) -> rr.LineStrips2D:
         """Return the strong contacts of fn (k, c) [N] in pictures at offsets (k, 2) [px], and faint outlines."""

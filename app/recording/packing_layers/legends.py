@@ -52,9 +52,9 @@ def log_force_legend(stream: rr.RecordingStream, scene: Scene) -> None:
         rr.LineStrips2D(legend_pieces(scene.canvas), radii=style.radii(fn), colors=style.colours(fn), draw_order=50.0),
         static=True,
     )
-    mean = style.range.mean
-    values = [(0.0, "0"), (mean, f"mean {mean:.3g} N"), (0.5 * (top + mean), f"{0.5 * (top + mean):.3g}")]
-    values.append((top, f"≥ {top:.3g} N"))
+    mean, unit = style.range.mean, scene.force_unit
+    values = [(0.0, "0"), (mean, f"mean {mean:.3g} {unit}"), (0.5 * (top + mean), f"{0.5 * (top + mean):.3g}")]
+    values.append((top, f"≥ {top:.3g} {unit}"))
     places = [(value / top, text) for value, text in values]
     log_legend_texts(stream, scene.canvas, entities.FORCE_LEGEND_TICKS, places)
     notes = [(0.98, "point: sliding", SLIDING)]

@@ -56,7 +56,8 @@ def _log_caption(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     """Log the caption above the rods, with their length as the scale and the range of the forces."""
     top, style = scene.outline(clock.frame), scene.style.range
     place = [float(np.nanmean(top[:, 0])), float(np.nanmax(top[:, 1]) + 3.0 * scene.tracks.radius.max()), 0.0]
-    key = f"rods of {1e3 * scene.rod_length:g} mm; forces from {style.mean:.3g} N (red) to {style.top:.3g} N (cream)"
+    unit, length = scene.force_unit, 1e3 * scene.rod_length
+    key = f"rods of {length:g} mm; forces from {style.mean:.3g} {unit} (red) to {style.top:.3g} {unit} (cream)"
     text = f"{caption_of_time(forces, clock.time)}\n{caption_of_trust(forces)}\n{key}"
     clock.log(
         entities.ROD_CAPTION,

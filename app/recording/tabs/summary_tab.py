@@ -107,12 +107,17 @@ def _counts(scene: Scene, frames: list[FrameSummary]) -> str:
         f"{walls.name[w]} {1e-3 * usual[w]:.4g} kPa{' on average, measured' if np.isnan(walls.pressure[w]) else ''}"
         for w in np.flatnonzero(walls.loaded)
     )
+    if not pressures:
+        scale = "the weight sets the scale" if scene.weight.any() else "forces are known up to a factor"
+        pressures = f"none loaded: {scale}"
+    else:
+        pressures = f"loaded: {pressures}"
     length_given = setting(scene.configuration, "material", "length") is not None
     return (
         f"{scene.tracks.frame_count} frames, {scene.grains.count} rods of {1e3 * scene.rod_length:g} mm"
         f"{'' if length_given else ' (assumed length: the configuration gives none)'}, "
         f"{walls.count} wall{'s' * (walls.count != 1)} "
-        f"({'loaded: ' + pressures if pressures else 'none loaded: forces are known up to a factor'}), "
+        f"({pressures}), "
         f"friction {scene.friction:g}. {sum(f.sweeps for f in frames)} sweeps in {len(frames)} frames."
     )
 
@@ -192,13 +197,13 @@ def _frames(frames: list[FrameSummary]) -> str:
 
 
 def _legend(scene: Scene, clipped: int, total: int) -> str:
-    force = scene.style.range
+    force, unit = scene.style.range, scene.force_unit
     return (
         "## Legend\n\n"
         f"- **Lines** join the centres of two rods in contact (or a rod and its contact point on a wall). Width and "
-        f"colour increase linearly with f_n, the same in every frame: grey and thin below {force.weak:.3g} N (half the "
-        f"mean), then deep red, orange, yellow, up to cream at {force.top:.3g} N. "
-        f"{clipped} of {total} forces are above and drawn as {force.top:.3g} N.\n"
+        f"colour increase linearly with f_n, the same in every frame: grey and thin below {force.weak:.3g} {unit} "
+        f"(half the mean), then deep red, orange, yellow, up to cream at {force.top:.3g} {unit}. "
+        f"{clipped} of {total} forces are above and drawn as {force.top:.3g} {unit}.\n"
         f"- **Gaps** in a line: the fraction of it that is missing is σ(f_n) / f_n, from {SURE:g} on; a row of dots "
         "is a force about which little is known. Sweeps have no gaps, as their uncertainty is not known.\n"
         "- **Caption** above the packing: frame, time, shear or change of area since frame 0, status, trust.\n"

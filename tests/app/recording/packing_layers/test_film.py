@@ -13,9 +13,11 @@ from rodsight.recording.packing_layers.film import (
     PICTURES,
     STRONG,
     STRONG_SWEEPS,
+    SWEEP_COLUMNS,
     SWEEP_PICTURES,
     film_bounds,
     film_frames,
+    step_across,
 )
 from rodsight.recording.tabs.layout_property import read_layout
 
@@ -65,8 +67,8 @@ def test_the_film_of_sweeps_ends_with_the_reported_forces(recording, results):
     strong = STRONG_SWEEPS * ForceRange.of(results.frames).mean
     below = np.array(shown["Points2D:positions"])[-1]
     lines = np.array(shown["LineStrips2D:strips"][: -OUTLINE * SWEEP_PICTURES])
-    width = film_bounds(read_layout(recording.path).canvas, 1)[0]
-    inside = (lines[..., 1] > below[1]) & (np.abs(lines[..., 0] - below[0]) < 0.5 * (width[1] - width[0]))
+    across = step_across(read_layout(recording.path).canvas, SWEEP_COLUMNS)
+    inside = (lines[..., 1] > below[1]) & (np.abs(lines[..., 0] - below[0]) < 0.5 * across)
     assert inside.all(axis=1).sum() == np.sum(results.frames[1].fn > strong)
 
 
