@@ -23,7 +23,7 @@ from tests.shapes import check_shapes
 from tests.sharing import made_once
 
 FAST = "not thorough and not slow and not screen"  # the marks of the fast tests, as in pyproject.toml
-TWO_PROCESSES = (FAST, "thorough", "not slow and not screen")  # these lanes, and both in one run, as in .ci/run
+TWO_PROCESSES = (FAST, "thorough", "not slow and not screen")  # these lanes, and both in one run
 
 check_shapes("rodsight.solver")
 

@@ -27,6 +27,7 @@ from .truths import agreement_of, observe, packing_of, simulate, true_forces, wi
 
 WINDOW = 14  # photographs of one sequence
 SETTLED_WITHIN = 0.01  # below the mean r of the last four frames
+SAME_PATTERN = 0.9  # least correlation of f_n under both boundary conditions
 NOISE = 1e-5  # [m], the precision the paper states
 
 
@@ -127,19 +128,16 @@ def _settling(paper: list[_Sequence], ours: list[_Sequence]) -> ClaimVerdict:
 
 
 def _boundaries(loaded: list[_Sequence], imposed: list[_Sequence]) -> ClaimVerdict:
-    r, factor = [], []
+    """Compare patterns only: without a load the factor of a frame is open, and is set to a mean force of one."""
+    r = []
     for one, other in zip(loaded, imposed, strict=True):
-        factors = []
         for a, b in zip(one.frames[3:], other.frames[3:], strict=True):
             _, fa, fb = align(a.contacts.key, a.fn, b.contacts.key, b.fn)
             r.append(pearson(fa, fb))
-            factors.append(fb.sum() / fa.sum())
-        factor.append(np.std(factors) / np.mean(factors))
     return ClaimVerdict(
         "both boundary conditions agree up to one factor",
-        f"pattern: r {np.mean(r):.3f} (least {np.min(r):.3f}); the factor varies by {100 * np.mean(factor):.0f} % "
-        "between frames",
-        "pattern yes, one factor no" if np.mean(factor) > 0.1 else "yes",
+        f"pattern: r {np.mean(r):.3f} (least {np.min(r):.3f}); without a load the factor is open in every frame",
+        "pattern yes" if np.min(r) > SAME_PATTERN else "no",
     )
 
 

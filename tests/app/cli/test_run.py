@@ -43,7 +43,6 @@ def test_a_tracked_experiment_runs_to_results_recording_and_summary(tracked, tmp
     assert summary["status"][0] == "reset"
 
 
-@pytest.mark.thorough
 def test_the_results_file_has_the_public_layout(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("solve", str(tracked), "--out", str(out), *FEW) == 0
@@ -135,7 +134,6 @@ def test_an_interrupt_ends_with_130_and_a_hint(tracked, tmp_path, monkeypatch, c
     assert "resumes" in capsys.readouterr().err
 
 
-@pytest.mark.thorough
 def test_photographs_are_tracked_and_solved(made_photographs, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("run", str(made_photographs), "--out", str(out)) == 0

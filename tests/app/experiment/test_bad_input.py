@@ -97,7 +97,6 @@ def test_a_missing_experiment_is_named(tmp_path, capsys):
     assert "no such file" in refuse(capsys, tmp_path / "out", "run", str(tmp_path / "nowhere"))
 
 
-@pytest.mark.thorough
 def test_bad_input_leaves_finished_results_unchanged(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("solve", str(tracked), "--out", str(out), "--quiet", "--set", "solver.sweeps=5") == 0

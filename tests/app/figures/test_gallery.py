@@ -48,6 +48,13 @@ def test_every_figure_has_the_width_of_a_column_and_units(results):
     assert dict(matplotlib.rcParams) == before  # the settings of the user are unchanged
 
 
+def test_forces_of_open_scale_have_no_newtons(results):
+    walls = replace(results.walls, pressure=np.full(results.walls.count, np.nan))
+    axes, bar = draw_figure(replace(results, walls=walls), "forces", 3).axes
+    assert bar.get_ylabel().endswith("[a.u.]")
+    assert [each.get_text() for each in axes.texts if each.get_text().endswith(" a.u.")]
+
+
 def test_the_network_shows_every_contact_that_bears_force_and_its_length(results):
     axes, bar = draw_figure(results, "forces", 3).axes
     assert bar.get_ylabel().endswith("[N]")

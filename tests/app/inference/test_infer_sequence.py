@@ -100,7 +100,6 @@ def test_every_contact_states_the_coefficient_that_was_used(contradicted):
         assert (np.abs(frame.ft) <= expected * frame.fn * (1 + 1e-6) + 1e-9).all()
 
 
-@pytest.mark.thorough
 def test_an_interrupted_sequence_continues_bit_for_bit(contradicted):
     inputs, results = contradicted
     whole = MemoryStore()

@@ -87,7 +87,6 @@ def test_every_link_has_a_target_and_no_page_loads_from_another_site(tmp_path):
     assert "rodsight.solve(tracks" in (tmp_path / "api.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.thorough
 def test_every_message_has_its_cure():
     messages = find_messages()
     assert len(messages) > 300

@@ -15,6 +15,13 @@ MUTANTS = [
         ("    _returning = True", "    _returning = False"),
     ),
     *mutants_of(
+        "app/process/signals.py",
+        "tests/app/cli/test_signals.py",
+        ("frame.f_code.co_filename.startswith(LOCKING)", "False"),
+        ("if self._count < WAITING:", "if True:"),
+        ("attempt.try_again(unraisable.exc_value.number)", "pass"),
+    ),
+    *mutants_of(
         "app/process/lock.py",
         LOCK,
         ("if silence < LEASE:", "if silence < 0.0 * LEASE:"),

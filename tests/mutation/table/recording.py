@@ -17,4 +17,15 @@ MUTANTS = [
         ("points.counts.append(len(values))", "points.counts.append(1)"),
         ("        self._points.clear()\n", ""),
     ),
+    *mutants_of(
+        "app/tracks.py",
+        "tests/app/recording/packing_layers/test_force_units.py",
+        ("self.loaded.any() or weight.any()", "self.loaded.any()"),
+        ("self.loaded.any() or weight.any()", "weight.any()"),
+    ),
+    *mutants_of(
+        "app/recording/packing_layers/film.py",
+        "tests/app/recording/packing_layers/test_film.py",
+        ("max(canvas.width, NAME_WIDTH[columns] * canvas.height)", "canvas.width"),
+    ),
 ]

@@ -55,4 +55,16 @@ MUTANTS = [
         ("if seen < FEWEST_SEEN * known or seen == 0:", "if seen < 0:"),
         ("following = forget_forces(history.last)", "following = history.last"),
     ),
+    *mutants_of(
+        "solver/sequence/frame.py",
+        "tests/solver/sequence/test_open_scale.py",
+        ("if problem.scale_is_open and mean > 0.0:", "if False:"),
+        ("if problem.scale_is_open and mean > 0.0:", "if mean > 0.0:"),
+    ),
+    *mutants_of(
+        "solver/frame_forces.py",
+        "tests/solver/sequence/test_open_scale.py",
+        ("fn=np.float32(factor) * self.history.fn", "fn=self.history.fn"),
+        ("nlgs_fn=factor * self.nlgs_fn", "nlgs_fn=self.nlgs_fn"),
+    ),
 ]

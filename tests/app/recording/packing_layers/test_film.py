@@ -35,6 +35,14 @@ def test_pictures_are_few_and_cover_the_run():
     assert np.ptp(np.diff(chosen)) <= 1
 
 
+def test_columns_leave_space_for_the_names_of_narrow_pictures(recording):
+    canvas = read_layout(recording.path).canvas
+    narrow = replace(canvas, left=0.0, right=0.2 * canvas.height)
+    assert step_across(narrow, 3) == 1.5 * canvas.height
+    wide = replace(canvas, left=0.0, right=4.0 * canvas.height)
+    assert step_across(wide, 3) == wide.width
+
+
 def test_a_picture_shows_the_strong_forces_of_its_frame_beside_earlier_pictures(recording, results):
     strong = STRONG * ForceRange.of(results.frames).mean
     (left, right), (top, bottom) = film_bounds(read_layout(recording.path).canvas, 3)
