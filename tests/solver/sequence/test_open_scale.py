@@ -33,7 +33,7 @@ def solve(sheared: SimulatedShear, pressure: float) -> list[FrameForces]:
 def test_without_a_load_the_mean_force_of_every_frame_is_one(sheared):
     for frame in solve(sheared, np.nan):
         assert mean_normal_force(frame.fn) == pytest.approx(1.0)
-        # what a single chain reports is its last sweep, which has the same scale
+        # the last sweep of a single chain, which it reports, has the same scale
         np.testing.assert_allclose(frame.nlgs_fn, frame.fn)
         assert frame.history.fn[-1] == pytest.approx(frame.fn, abs=1e-3)
 
