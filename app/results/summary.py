@@ -129,6 +129,7 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "trust_penalties": [frame.trust_penalties for frame in frames],
         "friction_angle_degrees": _plain([float(np.rad2deg(each.friction_angle)) for each in statistics]),
         "coordination_number": _plain([each.coordination_number for each in statistics]),
+        "force_unit": results.force_unit,
         "mean_fn": _plain([each.mean_fn for each in statistics]),
         "deviations": {
             name: _plain([float(each.deviations[n]) for each in statistics]) for n, name in enumerate(CONSTANT)

@@ -290,7 +290,6 @@ def _study_trust(request: _StudyRequest, *, jobs: int, fit: tuple[int, ...]) -> 
     from ...inference.diagnosis.trial import PREDICTED_PHOTOGRAPHS
     from ...study.scenarios import trust_study
     from ...study.scenarios.score_table import WIDTH, score_scenarios
-    from ...study.scenarios.trust_study import TrustSample
 
     console = table_console(WIDTH)
     scenarios: tuple[ScenarioName, ...] = request.scenarios or get_args(ScenarioName)
@@ -299,12 +298,13 @@ def _study_trust(request: _StudyRequest, *, jobs: int, fit: tuple[int, ...]) -> 
         if fit:
             read: list[ScenarioName] = [name for name in scenarios if name not in trust_study.LEFT_OUT]
             read_scores = score_scenarios(request.plan, read, fit, jobs=jobs, progress=progress)
-            still = score_scenarios(request.plan, trust_study.CLOSED_KINDS, fit, jobs=jobs, progress=progress)
             fits = trust_study.fit_by_title(read_scores)
+            closed = trust_study.CLOSED_KINDS if "both" in fits else ()
+            still = score_scenarios(request.plan, closed, fit, jobs=jobs, progress=progress)
             for each in trust_study.describe_fits(fits, read_scores, still, PREDICTED_PHOTOGRAPHS):
                 print_line(console, each)
         scores = score_scenarios(request.plan, scenarios, request.seeds, jobs=jobs, progress=progress)
-    sample = trust_study.refit(TrustSample.of(scores), fits)
+    sample = trust_study.refit(trust_study.TrustSample.of(scores), fits)
     new = np.isin(sample.kind, list(trust_study.LEFT_OUT))
     trust_study.print_trust(console, "Kinds that the fit has read", sample.select(~new))
     trust_study.print_trust(console, "Kinds left out of the fit", sample.select(new))

@@ -21,7 +21,7 @@ from ...solver.assessment.intervals.scale_sd import FIRST_BY_SECOND, TABLE, TERM
 from ...solver.assessment.intervals.scale_sd import LEAST as LEAST_SCALE_SD
 from ...solver.bodies.grains import Array
 from ...synthetic.scenarios.preset_names import Group, ScenarioName
-from ...synthetic.scenarios.scenario_table import SCENARIOS, Scenario
+from ...synthetic.scenarios.scenario_table import SCENARIOS
 from ..fitting.additive_fit import AdditiveFit, correlation_target, fit_additive
 from ..fitting.bound_fit import BoundFit, JudgedFrames, fit_bound
 from ..fitting.scale_fit import ScaleSample, describe_scale, fit_first, scale_sd_of
@@ -196,10 +196,10 @@ def fit_expected(sample: TrustSample, names: Sequence[str]) -> TrustFit:
 
 
 def fit_by_title(scores: Sequence[ScenarioScore]) -> dict[str, TrustFit]:
-    """Fit every one of FITS to the frames that it reads."""
+    """Fit every one of FITS that reads frames of enough kinds."""
     known = TrustSample.of(scores)
     read = {title: rows_of(known, title) for title in FITS}
-    return {title: fit_expected(rows, FITS[title]) for title, rows in read.items() if len(rows.r)}
+    return {title: fit_expected(rows, FITS[title]) for title, rows in read.items() if _has_kinds(rows)}
 
 
 def describe_fits(
@@ -214,21 +214,21 @@ def describe_fits(
     scores : sequence of ScenarioScore
         That they were fitted to.
     still : sequence of ScenarioScore
-        Of CLOSED_KINDS.
+        Of CLOSED_KINDS; empty: fits without a known load only, under which there is no scale either.
     photographs : int
         The first ones of a test, by which r is predicted.
     """
     tests = TrustSample.of_tests([each for each in scores if not each.refused], photographs)
-    return [
+    tables = [
         *(fit.describe(title) for title, fit in fits.items()),
         *(describe_prediction(title, tests.select(tests.loaded == loaded)) for title, loaded in PREDICTIONS.items()),
-        describe_scale_fit(scores), describe_closed_fit(still),
     ]  # fmt: skip
+    return [*filter(None, tables), *([describe_scale_fit(scores), describe_closed_fit(still)] if still else [])]
 
 
 def describe_prediction(title: str, tests: TrustSample) -> str:
-    """Fit the prediction on whole tests, and describe it as the table of fitted.toml; empty without a test."""
-    if not len(tests.r):
+    """Fit the prediction on whole tests, and describe it as the table of fitted.toml; empty with few kinds of tests."""
+    if not _has_kinds(tests):
         return ""
     whole, score = _fit_leaving_out(tests, PREDICTED_BY[title])
     sd = float(np.quantile(np.abs(correlation_target(tests.r) - score), WITHIN_INTERVAL))
@@ -356,15 +356,15 @@ def refit(sample: TrustSample, fits: dict[str, TrustFit]) -> TrustSample:
 def rows_of(sample: TrustSample, fit: str) -> TrustSample:
     """The frames that a fit of this name reads; for overlaps also all of soft grains where that was not detected."""
     if fit == "overlaps":
-        soft = np.isin(sample.kind, [name for name, each in SCENARIOS.items() if _is_soft(each)])
+        stiffness = {name: each.loading.settings.normal_stiffness for name, each in SCENARIOS.items()}
+        soft = np.isin(sample.kind, [name for name, each in stiffness.items() if each < SOFT])
         return sample.select(soft | sample.overlaps)
-    if fit == "motion":
-        return sample.select(~sample.overlaps)
-    return sample.select(~sample.overlaps & (sample.loaded == (fit == "both")))
+    return sample.select(~sample.overlaps & (sample.loaded == (fit != "unloaded")))
 
 
-def _is_soft(scenario: Scenario) -> bool:
-    return scenario.loading.settings.normal_stiffness < SOFT
+def _has_kinds(sample: TrustSample) -> bool:
+    """Whether a fit on these frames holds for more than a few kinds."""
+    return len(np.unique(sample.kind)) >= FOLDS
 
 
 def print_trust(console: Console, title: str, sample: TrustSample) -> None:

@@ -43,6 +43,7 @@ def run_overview(folder: Path, outdated: Sequence[str] = ()) -> dict[str, Any] |
         "status": summary.get("status_count", {}),
         "trust": min(trust) if trust else None,
         "lost": summary.get("lost_grains"),
+        "force_unit": summary.get("force_unit", "N"),  # of earlier runs
         "finished_at": (folder / SUMMARY).stat().st_mtime,
         "out_of_date": list(outdated),
         "faults": [

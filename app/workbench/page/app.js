@@ -9,6 +9,7 @@ import { drawSetup } from "/page/layers/setup.js";
 import { clearPlot, togglePlot } from "/page/time/plot.js";
 import { closeSheet, isSheetOpen, sheetButton, toggleSheet } from "/page/time/sheet.js";
 import { runMark, standing } from "/page/parts/run_state.js";
+import { useForcesOf } from "/page/units.js";
 import { photographs } from "/page/steps/photographs.js";
 import { scale } from "/page/steps/scale.js";
 import { walls } from "/page/steps/walls.js";
@@ -114,10 +115,11 @@ setInterval(() => { if (!document.hidden) listen(); }, 2 * LOOKS);
 addEventListener("unanswered", listen);
 
 /** The state of the experiment after an action that does not answer with it, so that its undo is known. */
-app.refresh = async () => { app.project = await request("project", { at: app.project.at }); };
+app.refresh = async () => { app.project = await request("project", { at: app.project.at }); useForcesOf(app.project); };
 
 app.take = (project) => {
   app.project = project;
+  useForcesOf(project);
   app.frame = Math.min(app.frame, Math.max(project.frames - 1, 0));
   app.step.taken?.(app);
   app.paint();
@@ -131,6 +133,7 @@ app.open = (project, step = null) => {
   at("home").hidden = true;
   app.frame = 0; app.looked = 0;
   app.project = project;
+  useForcesOf(project);
   const first = STEPS.find((each) => markOf(each) !== "good" && project.steps.some((s) => s.name === each.name));
   app.go(STEPS.find((each) => each.name === step) ?? first ?? STEPS[0]);
 };

@@ -24,6 +24,13 @@ export const measured = (kind, value, count = 4) => `${within(kind, value, count
 /** What a person typed, in SI; twelve digits, so that 0.1 mm is not 0.00010000000000000002 m. */
 export const typed = (kind, text, what) => Number((parse(text, what) * siOf(kind)).toPrecision(12));
 
+let forces = "N";
+/** The unit of the forces of the run: arbitrary where neither a load nor the weight sets their scale. */
+export const useForcesOf = (project) => { forces = project?.run?.force_unit ?? "N"; };
+/** The unit that is shown for a unit of a quantity. */
+export const shown = (unit) => (unit === "N" ? forces : unit);
+export const force = (value, count = 3) => `${digits(value, count)} ${forces}`;
+
 export function choice(kind, app) {
   return h("div", { class: "field" }, h("label", { htmlFor: `unit-${kind}` }, `${kind}s in`), h("select", { id: `unit-${kind}`, onchange: (event) => {
     chosen[kind] = event.target.value;

@@ -6,10 +6,17 @@ import math
 
 import numpy as np
 import pytest
-from rodsight.solver.assessment.expected_correlation import CLOSED
+from rodsight.solver.assessment.expected_correlation import CLOSED, MEASURES
 from rodsight.study.fitting.additive_fit import fit_additive
 from rodsight.study.scenarios.scenario_score import ScenarioScore
-from rodsight.study.scenarios.trust_study import CLOSED_KINDS, CLOSED_STEPS, describe_closed_fit, fit_closed
+from rodsight.study.scenarios.trust_study import (
+    CLOSED_KINDS,
+    CLOSED_STEPS,
+    describe_closed_fit,
+    describe_fits,
+    fit_by_title,
+    fit_closed,
+)
 
 ALONE = 0.9  # trust by all other evidence
 
@@ -40,3 +47,29 @@ def test_values_above_the_usual_one_have_knots_of_their_own():
     assert len(fit.terms["x"][0]) > 6
     shown = np.array([0.0, 1.0, 2.0, 3.0])
     assert fit.score({"x": shown}, {}) == pytest.approx(2.0 - 0.4 * shown, abs=0.25)
+
+
+def unloaded(scenario, seed: int, overlaps: bool = False) -> ScenarioScore:
+    """Eleven frames without a known load; r falls with the first measure."""
+    rng = np.random.default_rng(seed)
+    measures = np.exp(rng.uniform(np.log(0.03), np.log(0.3), (11, len(MEASURES))))
+    r = 0.97 - 0.5 * measures[:, 0]
+    unknown = [None] * len(MEASURES)
+    return ScenarioScore(
+        scenario, seed, "", r=tuple(r), trust=(0.8,) * 11, expected=(0.9,) * 11, status=("settled",) * 11,
+        measures=tuple(unknown if overlaps else row for row in measures.tolist()), overlaps=(overlaps,) * 11,
+        loaded=False,
+    )  # fmt: skip
+
+
+def test_only_tables_are_fitted_of_which_enough_kinds_are_read():
+    kinds = ["outer", "outer_biaxial", "outer_isotropic", "isotropic", "periodic", "unknown_load"]
+    scores = [unloaded(kind, seed) for kind in kinds for seed in (1, 2)]
+    scores += [unloaded("nearly_jammed", seed, overlaps=True) for seed in (1, 2)]  # nothing else is known of them
+    fits = fit_by_title(scores)
+    assert list(fits) == ["unloaded"]
+    tables = describe_fits(fits, scores, [], 5)
+    assert [each.split("\n")[0] for each in tables] == [
+        "[expected_correlation.unloaded]", "[expected_correlation.unloaded_prediction]"
+    ]  # fmt: skip
+    assert list(fit_by_title(scores[:4])) == []

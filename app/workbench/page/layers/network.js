@@ -2,6 +2,7 @@
 
 import { look, rangeOfValues, scaleOf } from "/page/layers/colours.js";
 import { layers, paintLayer } from "/page/layers/settings.js";
+import { shown } from "/page/units.js";
 
 export { loadLook } from "/page/layers/colours.js";
 
@@ -68,7 +69,7 @@ export function drawNetwork(c, k, stage, net, { faint = false } = {}) {
 export function networkLegends(net) {
   if (!look) return [];
   const how = COLOURINGS[layers.forces.by], scale = scaleOfForces(net), found = [];
-  if (layers.forces.on) found.push({ words: how.force ? `${how.words}, ${scale.own ? "all frames" : "not as in the recording"}` : how.words, unit: how.unit, below: how.force ? "grey below " : "", scale });
+  if (layers.forces.on) found.push({ words: how.force ? `${how.words}, ${scale.own ? "all frames" : "not as in the recording"}` : how.words, unit: shown(how.unit), below: how.force ? "grey below " : "", scale });
   if (layers.uncertainty.on) found.push({ words: "band: sd of f_n / mean f_n", scale: scaleOfUncertainty() });
   return found;
 }

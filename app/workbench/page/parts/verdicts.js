@@ -1,6 +1,7 @@
 // Verdicts on pairs, shared by the steps Inspect and Review: names, colours, marks, and the verdicts already given.
 
 import { digits, fact, h, notify, request } from "/page/dom.js";
+import { force as inUnit } from "/page/units.js";
 
 export const VERDICTS = { c: "contact", n: "no contact", u: "unsure" };
 // Verdicts differ in shape as well as colour. Okabe and Ito's colours, brighter for a dark ground.
@@ -55,7 +56,7 @@ export function drawSelected(c, k, point, circles, radius) {
   c.lineWidth = 2.1 / k; c.strokeStyle = "#fff"; c.stroke(path);
 }
 
-const force = (value) => (value === null ? "none" : `${digits(value, 3)} N`);
+const force = (value) => (value === null ? "none" : inUnit(value));
 
 /** The forces of a judged pair: before the verdict, and since a run has applied it. */
 export function beforeAfter(frame, pair) {

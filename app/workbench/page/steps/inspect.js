@@ -11,7 +11,7 @@ import { showLanes, jump } from "/page/time/lanes.js";
 import { runMark } from "/page/parts/run_state.js";
 import { Recording } from "/page/parts/recording.js";
 import { VERDICTS, COLOURS, beforeAfter, bodyName, drawMark, drawSelected, givenSection, hasReviewer, loadGiven, loadReviewer, pairName, reviewerField, samePair, viewOf } from "/page/parts/verdicts.js";
-import { measured } from "/page/units.js";
+import { force, measured, shown } from "/page/units.js";
 
 let facts = null, net = null, list = null, chosen = null, past = null, rodPast = null, wallLines = [], since = 0, frameOf = -1, without = null, recording = null, wanted = null;
 
@@ -183,14 +183,14 @@ function pairCard(app) {
     judging,
     beforeAfter(k, chosen),
     [
-      row >= 0 ? [fact("f_n", with_(net.fn[row], net.fn_sd[row], "N")), fact("f_t", with_(net.ft[row], net.ft_sd[row], "N")), fact("state", /reviewer/.test(net.source[row]) ? net.source[row] : `${net.state[row]}, ${net.age[row]} frames old`)] : fact("force", "none: no contact"),
+      row >= 0 ? [fact("f_n", with_(net.fn[row], net.fn_sd[row], shown("N"))), fact("f_t", with_(net.ft[row], net.ft_sd[row], shown("N"))), fact("state", /reviewer/.test(net.source[row]) ? net.source[row] : `${net.state[row]}, ${net.age[row]} frames old`)] : fact("force", "none: no contact"),
       past ? fact("gap", with_(past.gap[k] === null ? null : past.gap[k] * 1e6, past.gap_sd[k] * 1e6, "µm")) : null,
       fact("P(touch)", digits(chosen.probability, 3)),
       past ? [h("span", { class: "soft" }, "normal force over the frames"), chart(58, "normal force over the frames", (c, w, hh) => spark(app, c, w, hh, seen.fn, seen.fn_sd, true)), h("span", { class: "soft" }, "gap over the frames [µm]"), chart(58, "gap over the frames", (c, w, hh) => spark(app, c, w, hh, seen.gap.map((v) => (v === null ? null : v * 1e6)), seen.gap_sd.map((v) => v * 1e6), false))] : null,
     ],
     row < 0 ? null : without ? [
       h("p", {}, without.balanced ? `Without it, the nearest forces in equilibrium change by ${digits(without.total_change, 3)} times the mean force in total (orange: more, blue: less).` : `Without it the rods around it are not in equilibrium: a residual of ${digits(without.residual, 2)} of the mean force is left. The contact is needed.`),
-      without.balanced ? h("div", { class: "list" }, without.largest.slice(0, 4).map((each) => h("div", {}, h("span", { style: { flex: "1" } }, pairName(each)), h("span", {}, `${each.change > 0 ? "+" : ""}${digits(each.change, 3)} N`)))) : null,
+      without.balanced ? h("div", { class: "list" }, without.largest.slice(0, 4).map((each) => h("div", {}, h("span", { style: { flex: "1" } }, pairName(each)), h("span", {}, `${each.change > 0 ? "+" : ""}${force(each.change)}`)))) : null,
     ] : h("button", { id: "without", onclick: () => toggleWithout(app) }, h("kbd", {}, "W"), " Forces without it"),
   );
 }
@@ -215,7 +215,7 @@ function rodCard(app) {
       h("span", { class: "soft" }, "correlation over the frames"), chart(58, "correlation over the frames", (c, w, hh) => spark(app, c, w, hh, seen.zncc, null, false)),
     ] : null,
     h("span", { class: "soft" }, "contacts"),
-    h("div", { class: "list" }, touching.map(([i, j, fn]) => h("button", { onclick: () => { const pair = list.find((each) => each.i === i && each.j === j); if (pair) pick(app, pair); } }, h("span", { style: { flex: "1" } }, bodyName(i === chosen.id ? j : i)), h("span", {}, `${digits(fn, 3)} N`)))));
+    h("div", { class: "list" }, touching.map(([i, j, fn]) => h("button", { onclick: () => { const pair = list.find((each) => each.i === i && each.j === j); if (pair) pick(app, pair); } }, h("span", { style: { flex: "1" } }, bodyName(i === chosen.id ? j : i)), h("span", {}, force(fn))))));
 }
 
 /** A line over the frames with its band of one standard deviation; a bar marks this frame. */

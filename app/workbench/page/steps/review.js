@@ -6,6 +6,7 @@ import { agreementSection } from "/page/parts/agreement.js";
 import { jump, showLanes } from "/page/time/lanes.js";
 import { CROP, cropAddress, cropWindow, drawOutlines, gapScale, intervalBar, svg } from "/page/parts/pair_drawing.js";
 import { runMark } from "/page/parts/run_state.js";
+import { force } from "/page/units.js";
 import { COLOURS, beforeAfter, drawMark, drawSelected, givenSection, hasReviewer, loadGiven, loadReviewer, pairName, reviewerField, samePair, verdicts, viewOf } from "/page/parts/verdicts.js";
 
 const ORDERS = { influence: "By influence", frame: "Whole frame", sample: "Sample of all" };
@@ -291,7 +292,7 @@ function progress(app) {
 function candidateList(app) {
   const listed = (state.frame?.pairs ?? []).filter((each) => each.priority !== null && each.priority !== undefined).slice(0, 14);
   return h("details", { id: "candidates", open: state.listed, ontoggle: (event) => { if (event.target.open !== state.listed) { state.listed = event.target.open; app.paint(); } } }, h("summary", {}, "Influence times ambiguity"), h("div", { class: "list" }, listed.map((each) => h("button", { onclick: () => show(app, { frame: app.frame, ...each }) },
-    h("span", { style: { flex: "1" } }, pairName(each)), h("span", { class: "soft" }, `P ${each.probability === null ? "–" : each.probability.toFixed(2)} · ${each.priority.toPrecision(2)} N`), each.verdict ? h("span", { class: "swatch", style: { background: COLOURS[each.verdict] } }) : null))));
+    h("span", { style: { flex: "1" } }, pairName(each)), h("span", { class: "soft" }, `P ${each.probability === null ? "–" : each.probability.toFixed(2)} · ${force(each.priority, 2)}`), each.verdict ? h("span", { class: "swatch", style: { background: COLOURS[each.verdict] } }) : null))));
 }
 
 /** Marks and their meaning, in the lower left corner of the photograph. */

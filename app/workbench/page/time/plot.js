@@ -4,6 +4,7 @@ import { at, colour, digits, h } from "/page/dom.js";
 import { download, fileName } from "/page/parts/take_away.js";
 import { sheetButton } from "/page/time/sheet.js";
 import { begin, dragFrames } from "/page/time/strip.js";
+import { shown } from "/page/units.js";
 
 const MOST = 4; // series at a time
 const DASHES = [[], [7, 4], [2, 3], [9, 3, 2, 3]]; // series differ in dashes as well as colour
@@ -24,6 +25,7 @@ const QUANTITIES = {
     coordination: ["coordination number", "", (data) => [data.coordination, null]], contacts: ["contacts", "", (data) => [data.contacts, null]], lost: ["lost rods", "", (data) => [data.lost, null]],
   },
 };
+const quantityOf = (kind) => { const [words, unit, of] = QUANTITIES[kind][plot.quantity[kind]]; return [words, shown(unit), of]; };
 
 const plot = { open: false, quantity: { pair: "fn", rod: "displacement", frame: "trust" }, kept: [] };
 
@@ -48,7 +50,7 @@ function seriesOf(facts, chosen) {
 /** The row of the plot, empty where it is closed. */
 export function plotRow(app, facts, chosen) {
   if (!plot.open || !facts) return [];
-  const { kind, items } = seriesOf(facts, chosen), [words, unit, values] = QUANTITIES[kind][plot.quantity[kind]];
+  const { kind, items } = seriesOf(facts, chosen), [words, unit, values] = quantityOf(kind);
   const kept = (name) => plot.kept.some((each) => each.kind === kind && each.name === name);
   const spoken = items.map((item) => `${item.name}: ${valueAt(values(item.data), app.frame, unit)}`).join("; ");
   const canvas = h("canvas", { id: "plot", role: "img", "aria-label": `${words} over the photographs; at photograph ${app.frame} ${spoken}` });
@@ -88,7 +90,7 @@ export function drawPlot(app, facts, chosen) {
   const canvas = at("plot");
   if (!canvas || !facts) return;
   const count = app.project.frames, { c, step, width, height } = begin(canvas, count);
-  const { kind, items } = seriesOf(facts, chosen), [, unit, of] = QUANTITIES[kind][plot.quantity[kind]];
+  const { kind, items } = seriesOf(facts, chosen), [, unit, of] = quantityOf(kind);
   const series = items.map((item) => ({ ...item, values: of(item.data) }));
   const all = series.flatMap(({ values: [values, sd] }) => values.flatMap((v, k) => (v === null || v === undefined ? [] : [v - (sd?.[k] ?? 0), v + (sd?.[k] ?? 0)])));
   c.fillStyle = colour("accent"); c.globalAlpha = 0.2; c.fillRect(app.frame * step, 0, Math.max(step, 2), height); c.globalAlpha = 1;
@@ -120,7 +122,7 @@ function limits(values) {
 
 /** The plotted values, one row for a photograph. */
 function save(app, facts, chosen) {
-  const { kind, items } = seriesOf(facts, chosen), name = plot.quantity[kind], [, unit, of] = QUANTITIES[kind][name];
+  const { kind, items } = seriesOf(facts, chosen), name = plot.quantity[kind], [, unit, of] = quantityOf(kind);
   const columns = items.flatMap((item) => { const [values, sd] = of(item.data), title = `${name}_${item.name.replace(/[^\w]+/g, "_")}${unit ? `_${unit}` : ""}`; return [[title, values], ...(sd ? [[`${title}_sd`, sd]] : [])]; });
   const rows = Array.from({ length: facts.count }, (_, k) => [k, ...columns.map(([, values]) => values[k] ?? "")].join(","));
   download(new Blob([[["frame", ...columns.map(([title]) => title)].join(","), ...rows].join("\n"), "\n"], { type: "text/csv" }), fileName(app, "over_time.csv"));
