@@ -1,9 +1,12 @@
 """Inspection and review in a real browser: the card of a contact, blind mode, agreement; a circle by three clicks."""
 
+import json
+import re
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Locator, Page, expect
+from rodsight.run_folder import SUMMARY
 
 from tests.app.workbench.hand import fill, go, idle, on_screen, opened
 
@@ -16,17 +19,7 @@ def test_a_contact_has_its_card_and_the_review_its_blind_mode(page: Page, solved
         idle(tab)
         go(tab, "inspect")
         assert tab.evaluate("workbench.frame") == 2  # the run begins there
-        rods = tab.evaluate("workbench.step.rodsOfFrame()")
-        card = tab.locator("#card")
-        for place in zip(rods[0::3], rods[1::3], strict=True):  # the first whose middle is not near a pair
-            tab.keyboard.press("Escape")
-            tab.mouse.click(*on_screen(tab, place))
-            idle(tab)
-            if "–" not in (card.locator(".fact").first.text_content() or ""):
-                break
-        expect(card).to_contain_text("radius")
-        card.locator(".list button").first.click()  # one of its contacts
-        idle(tab)
+        card = open_contact(tab)
         for word in ("P(touch)", "f_n", "gap"):
             expect(card).to_contain_text(word)
         low = tab.evaluate("document.querySelector('#card .verdicts').getBoundingClientRect().bottom")
@@ -58,6 +51,34 @@ def test_a_contact_has_its_card_and_the_review_its_blind_mode(page: Page, solved
         tab.go_back()  # the browser's Back is the step before
         idle(tab)
         expect(tab.locator("#panel h1")).to_have_text("Inspect")
+
+
+def open_contact(tab: Page) -> Locator:
+    """Choose a rod of the frame, then its first contact; gives the card."""
+    rods = tab.evaluate("workbench.step.rodsOfFrame()")
+    card = tab.locator("#card")
+    for place in zip(rods[0::3], rods[1::3], strict=True):  # the first whose middle is not near a pair
+        tab.keyboard.press("Escape")
+        tab.mouse.click(*on_screen(tab, place))
+        idle(tab)
+        if "–" not in (card.locator(".fact").first.text_content() or ""):
+            break
+    expect(card).to_contain_text("radius")
+    card.locator(".list button").first.click()  # one of its contacts
+    idle(tab)
+    return card
+
+
+def test_forces_of_open_scale_have_no_newtons(page: Page, solved: Path):
+    summary = {"frame_count": 3, "grain_count": 12, "trust": [0.9] * 3, "status_count": {"settled": 3}}
+    (solved / "runs" / "mine" / SUMMARY).write_text(json.dumps({**summary, "force_unit": "a.u."}))
+    with opened(page, solved) as tab:
+        tab.locator(".tile").first.click()
+        idle(tab)
+        go(tab, "inspect")
+        card = open_contact(tab)
+        expect(card).to_contain_text(re.compile(r"f_n[–0-9. ±]+ a\.u\."))
+        assert re.search(r"\d N\b", card.inner_text()) is None
 
 
 def judged(tab: Page) -> list[dict]:
