@@ -100,7 +100,8 @@ def plateau_ratio(force: Array, weight: Array | None = None) -> Estimate:
     count = float(weight[weak].sum())
     if count == 0.0:
         return Estimate(float("nan"), float("nan"))
-    fraction = min(weighted_mean((force[weak] < 0.5 * mean).astype(np.float64), weight[weak]), 1.0)  # of all, by rounding
+    fraction = weighted_mean((force[weak] < 0.5 * mean).astype(np.float64), weight[weak])
+    fraction = min(fraction, 1.0)  # the mean of ones exceeds it by rounding
     return Estimate(2.0 * fraction, 2.0 * float(np.sqrt(fraction * (1.0 - fraction) / count)))
 
 

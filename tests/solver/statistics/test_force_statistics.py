@@ -68,6 +68,14 @@ def test_equal_forces_have_neither_tail_nor_weak_forces():
     assert np.isnan(plateau_ratio(np.full(4, 2.0)).value)
 
 
+def test_plateau_ratio_has_a_deviation_where_all_weak_forces_are_below_half_the_mean():
+    rng = np.random.default_rng(0)
+    for _ in range(50):  # the sum of weights and their product with ones differ by rounding
+        found = plateau_ratio(np.append(np.full(8, 0.1), 100.0), np.append(rng.random(8), 1.0))
+        assert found.value == pytest.approx(2.0)
+        assert found.standard_error == pytest.approx(0.0, abs=1e-6)
+
+
 def test_plateau_ratio_distinguishes_plateau_rise_and_fall():
     fraction = quantiles()
     assert plateau_ratio(plateau_and_tail(fraction, 1.4)).value == pytest.approx(1.0, rel=QUANTILES)
