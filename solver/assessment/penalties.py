@@ -22,6 +22,7 @@ BEYOND_WALL_LOSS = 12.0  # for each grain beyond a wall, per grain
 FEW_PHOTOGRAPHS, TRUST_OF_FEW = 3, 0.28  # of a test, below which the trust is at most the second
 LEFT_BY_INTERVALS = 2.5, 0.4  # of `most_by_intervals`
 LITTLE_KNOWN = frozenset({"undetermined", "noise", "few_interior"})  # measures that contradict nothing
+BY_NOISE = frozenset({"disagreement_of_positions", "disagreement_with_either"})  # the same where noise hides overlaps
 REPORTED = 0.04  # fraction of the trust above which a penalty is reported in words
 
 
@@ -179,12 +180,15 @@ def _contradictions(evidence: Evidence) -> list[Penalty]:
     coarse = (
         f": photographs are {step:.2g}° of shear apart, take them every .25°" if evidence.shear > COARSE_STEP else ""
     )
+    lost = losses(evidence)
+    noisy = lost.get("noise", 0.0) > REPORTED
+    hidden = f"a noise of {1e6 * found.noise:.3g} µm hides the overlaps" if noisy else ""
     words = {
         "disagreement_of_estimates": f"forces from the motion and from the positions agree by {evidence.agreement:.2f} "
         "only: camera, radii, walls or friction are wrong, or the packing does what this model lacks",
         "disagreement_with_either": "forces from the motion agree neither with those from the positions nor with the "
-        f"overlaps by more than {np.fmax(evidence.agreement, evidence.overlap_agreement):.2f}: radii or walls are "
-        "wrong, or noise hides the overlaps",
+        f"overlaps by more than {np.fmax(evidence.agreement, evidence.overlap_agreement):.2f}: "
+        + (hidden or "radii or walls are wrong, or noise hides the overlaps"),
         "correction": f"the forces correct the measured motion by ε = {evidence.correction:.2g}: tracks, friction, a "
         "missing contact",
         "previous_residual": f"the previous forces leave a residual of ū = {evidence.old_unbalance:.2g}: the packing "
@@ -194,7 +198,8 @@ def _contradictions(evidence: Evidence) -> list[Penalty]:
         "gap_error": f"gaps of strong contacts deviate by {1e6 * found.gap_error:.3g} µm beyond noise: radii or "
         "centres are wrong, or grains soft; measure radii, or let calibration find them",
         "disagreement_of_positions": "forces from the positions and from the balance of overlaps agree by "
-        f"{evidence.position_agreement:.2f} only: radii, centres or the camera are wrong, or noise hides the overlaps",
+        f"{evidence.position_agreement:.2f} only: "
+        + (hidden or "radii, centres or the camera are wrong, or noise hides the overlaps"),
         "closed_overlap": f"gaps were corrected by {1e6 * evidence.corrected_gap:.3g} µm as errors of single rods, and "
         "overlaps with them: little is left that shows forces where nothing slides; measure centres and radii",
         "power_gap": f"{100.0 * evidence.power_gap:.0f} % of the power of friction at its limit is missing from the "
@@ -216,10 +221,8 @@ def _contradictions(evidence: Evidence) -> list[Penalty]:
         "photograph a larger part of the packing, or its walls",
         "force_change": f"{100.0 * evidence.force_change:.0f} % of the force pattern is new{coarse}",
     }
-    return [
-        Penalty(loss, words[name], counted=True, little_known=name in LITTLE_KNOWN)
-        for name, loss in losses(evidence).items()
-    ]
+    little = LITTLE_KNOWN | BY_NOISE if noisy else LITTLE_KNOWN
+    return [Penalty(loss, words[name], counted=True, little_known=name in little) for name, loss in lost.items()]
 
 
 def _boundary(evidence: Evidence) -> Penalty | None:

@@ -105,7 +105,7 @@ def diagnose(
         found = _examine_sliding(inputs, first)
     if not (found or trial is None or inputs.tracks.grain_count < LEAST_GRAINS):
         # Gaps between hard rods show a stretching by themselves. Where they show none, one that wins moves the walls.
-        sought = undisturbed or seeks_distortion(inputs, walls)
+        sought = undisturbed or seeks_distortion(inputs, walls, failed)
         excluded = ("stretched_picture",) if sought and not (camera or trial.soft) else ()
         found = _compare_rivals(inputs, trial, progress, first, excluded)
     if poses and float(impossible.mean()) > FEW_OUTLIERS:  # so many explain it

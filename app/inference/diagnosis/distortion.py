@@ -9,6 +9,7 @@ from ...solver.boundary.camera_distortion import ANISOTROPY, CameraDistortion
 from ...tracks import Tracks, WallTracks
 from ..correction.boundary import correct_camera
 from ..correction.radii import correct_exchanged_sizes
+from ..correction.softness import assume_softness
 from ..inputs import Inputs
 from .causes import finding
 
@@ -24,18 +25,21 @@ def undistorted(
     if settings.calibration is not None:
         tracks, exchanged = correct_exchanged_sizes(tracks, walls)
     named = [finding("exchanged_sizes", exchanged)] if exchanged else []
-    if not (camera and seeks_distortion(inputs, walls)):
+    if not (camera and seeks_distortion(inputs, walls, failed)):
         return tracks, walls, named
     tracks, walls, _, found = correct_camera(
         inputs.material, tracks, walls, failed, radii_known=settings.radii_are_known
     )
-    return tracks, walls, named if found is None else [*named, _name(found)]
+    return tracks, walls, [*named, _name(found)] if found is not None and found.applied else named
 
 
-def seeks_distortion(inputs: Inputs, walls: WallTracks) -> bool:
-    """Whether a run looks for a distortion of the camera in the gaps between rods."""
+def seeks_distortion(inputs: Inputs, walls: WallTracks, failed: Collection[int]) -> bool:
+    """Whether a run looks for a distortion of the camera in the gaps between rods, and no overlaps hide it."""
     boundary = inputs.settings.boundary
-    return boundary is not None and bool(boundary.camera) and walls.count > 0
+    if boundary is None or not boundary.camera or walls.cell is not None:
+        return False
+    material, _ = assume_softness(inputs.material, inputs.tracks, walls, failed)
+    return walls.count > 0 or material.stiffness in (None, "rigid")
 
 
 def _name(found: CameraDistortion) -> Finding:

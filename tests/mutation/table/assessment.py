@@ -133,6 +133,12 @@ MUTANTS = [
     ),
     *mutants_of(
         "solver/assessment/penalties.py",
+        "tests/app/inference/diagnosis/test_diagnose.py",
+        ('noisy = lost.get("noise", 0.0) > REPORTED', "noisy = False"),
+        ('noisy = lost.get("noise", 0.0) > REPORTED', "noisy = True"),
+    ),
+    *mutants_of(
+        "solver/assessment/penalties.py",
         PENALTIES,
         ("if not each.counted:", "if each.counted:"),
         ("1.0 if frame.soft else correlation_by_intervals(frame)", "correlation_by_intervals(frame)"),

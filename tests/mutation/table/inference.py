@@ -8,6 +8,13 @@ OUTLIERS = f"{TESTS}/test_outliers.py"
 
 MUTANTS = [
     *mutants_of(
+        "app/inference/diagnosis/distortion.py",
+        f"{TESTS}/diagnosis/test_diagnose.py",
+        ("if found is not None and found.applied else named", "if found is not None else named"),
+        ('return walls.count > 0 or material.stiffness in (None, "rigid")', "return walls.count > 0"),
+        ('return walls.count > 0 or material.stiffness in (None, "rigid")', "return True"),
+    ),
+    *mutants_of(
         "app/inference/correction/radii.py",
         f"{TESTS}/test_radii.py",
         ("radius=tracks.radius + found.correction", "radius=tracks.radius - found.correction"),

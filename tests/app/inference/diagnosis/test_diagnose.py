@@ -85,6 +85,22 @@ def test_a_stretching_that_the_gaps_of_rods_exclude_is_not_named(scores):
         assert found.cause == named
 
 
+def test_a_stretching_is_sought_in_gaps_without_walls_too():
+    walls = replace(
+        INPUTS.walls, name=(), endpoints=INPUTS.walls.endpoints[:, :0], pressure=INPUTS.walls.pressure[:0]
+    )
+    cropped = replace(INPUTS, walls=walls, tracks=replace(INPUTS.tracks, radius=INPUTS.tracks.radius.copy()))
+    assert distortion.seeks_distortion(cropped, walls, ())
+    periodic = replace(walls, cell=np.ones((INPUTS.tracks.frame_count, 2, 2)))
+    assert not distortion.seeks_distortion(cropped, periodic, ())
+    soft = replace(cropped, material=replace(cropped.material, stiffness=1e5))  # overlaps hide a stretching
+    assert not distortion.seeks_distortion(soft, walls, ())
+    assert distortion.undistorted(cropped, walls, ())[2] == []
+    wide = replace(cropped.tracks, position=cropped.tracks.position * [1.02, 1.0])
+    (found,) = distortion.undistorted(replace(cropped, tracks=wide), walls, ())[2]
+    assert found.cause == "stretched_picture"
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("rises", [
     {"all_radii": 0.5, "stretched_picture": 0.45},
@@ -105,6 +121,16 @@ def test_data_that_show_little_contradict_nothing(scores):
     assert trial.expected[0] < module.UNEXPLAINED
     assert trial.worst.little_known
     assert causes(hidden) == []
+
+
+def test_noise_that_hides_overlaps_contradicts_nothing():
+    apart = replace(SOUND, loaded=False, agreement=0.9, disagreement=0.3, position_agreement=0.5, interior=150)
+    for noise, explains in ((5e-6, False), (8e-5, True)):
+        information = replace(apart.information, noise=noise, diameter=0.02, undetermined=0.2)
+        worst = Trial((replace(apart, information=information),), 1).worst
+        assert worst.words.startswith("forces from the positions and from the balance of overlaps agree by 0.50 only")
+        assert worst.little_known == explains
+        assert worst.words.endswith("noise hides the overlaps") != explains
 
 
 def test_confused_names_are_named_and_hide_nothing_else():
