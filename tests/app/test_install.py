@@ -82,6 +82,7 @@ def test_the_wheel_holds_the_package_its_data_and_no_tests(wheel):
     assert (wheel / "rodsight" / "solver" / "py.typed").is_file()
 
 
+@pytest.mark.slow
 def test_the_first_run_of_the_wheel_compiles_nothing(wheel, tmp_path):
     assert run_first(wheel, tmp_path).compilations == 0
     (archive,) = (wheel / "rodsight/shipped_kernels").iterdir()

@@ -95,6 +95,7 @@ def collect_problems(faults: list[Fault], originals, work: Path) -> tuple[int, l
     return met, problems
 
 
+@pytest.mark.thorough
 def test_some_faults_end_with_one_line_and_lose_nothing(originals, tmp_path):
     met, problems = collect_problems(
         list(all_faults())[:: len(list(all_faults())) // QUICK], originals, tmp_path / "work"

@@ -29,7 +29,7 @@ def blacken(experiment: Path, frame: int) -> None:
     cv2.imwrite(str(file), np.zeros_like(image))
 
 
-@pytest.mark.screen  # seconds of photographs
+@pytest.mark.thorough  # seconds of photographs
 def test_a_black_photograph_fails_its_own_frame(made_photographs, tmp_path, capsys):
     experiment, out = Path(shutil.copytree(made_photographs, tmp_path / "black")), tmp_path / "out"
     keep_first_walls(experiment)  # walls are tracked in the photographs, and lost there, too

@@ -116,7 +116,7 @@ def test_cut_off_runs_of_different_settings_do_not_mix_frames(tracked, tmp_path,
     assert np.array_equal(forces(out), forces(tmp_path / "whole"))
 
 
-@pytest.mark.screen  # several whole runs
+@pytest.mark.thorough  # several whole runs
 @pytest.mark.parametrize(
     "piece", ["results.h5", pytest.param(".unfinished/solving/000001.piece", marks=pytest.mark.slow)]
 )
@@ -168,7 +168,7 @@ def test_a_file_that_changes_while_it_is_used_ends_the_run(tracked, tmp_path, ca
     assert not (tmp_path / "out" / "results.h5").exists()
 
 
-@pytest.mark.screen  # several whole runs
+@pytest.mark.thorough  # several whole runs
 def test_a_verdict_given_during_a_run_is_used_by_the_next_run_only(tracked, tmp_path, monkeypatch):
     out = tmp_path / "out"
     command = ("solve", tracked, "--out", out, *FEW)

@@ -95,7 +95,7 @@ def test_the_truth_is_in_equilibrium():
         assert np.linalg.norm(total, axis=1).mean() < BALANCE * fn[frame == k].mean()
 
 
-@pytest.mark.screen
+@pytest.mark.thorough
 def test_the_sample_gives_accurate_forces_and_a_valid_recording(tmp_path, capsys):
     with pytest.raises(SystemExit) as stop:
         main(["run", str(SAMPLE), "--out", str(tmp_path / "run"), "--set", golden.SETTING])

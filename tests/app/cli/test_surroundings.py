@@ -17,7 +17,7 @@ FEW = ("--set", "solver.estimator=nlgs", "--set", "solver.sweeps=20")
 UNUSUAL_NAME = 'it\'s "5°" of; shear & $HOME Ω\u00a0試験'
 
 
-@pytest.mark.screen
+@pytest.mark.thorough
 def test_a_minimal_environment_and_unusual_names_are_accepted(tracked, tmp_path):
     experiment = Path(shutil.move(tracked, tmp_path / UNUSUAL_NAME))
     bare = {

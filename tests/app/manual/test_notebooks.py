@@ -52,7 +52,7 @@ def test_there_are_four_without_outputs_and_the_page_names_them():
         assert not any(cell.get("outputs") for cell in book.cells)
 
 
-@pytest.mark.screen  # many seconds
+@pytest.mark.thorough  # many seconds
 @pytest.mark.parametrize(
     "file",
     [

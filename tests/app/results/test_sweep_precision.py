@@ -46,7 +46,7 @@ def stored(tmp_path_factory) -> Path:
     return file
 
 
-@pytest.mark.screen  # five frames with every sweep
+@pytest.mark.thorough  # five frames with every sweep
 def test_a_contact_and_sweep_of_a_solved_run_take_less_than_a_byte(made_tracks, tmp_path):
     run = rodsight.run(made_tracks, out=tmp_path, settings={"recording.sweeps": "all"})
     with h5py.File(run.file) as file:

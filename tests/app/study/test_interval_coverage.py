@@ -64,7 +64,7 @@ def test_coverages_beyond_their_tolerance_are_named_with_their_sign():
     assert describe_violations((0.74, 0.95, 0.68, 0.93)) == "f_n 68 +, f_t 95 −"
 
 
-@pytest.mark.screen  # a scenario solved twice
+@pytest.mark.thorough  # a scenario solved twice
 def test_ensemble_members_widen_intervals_and_never_narrow_them(tmp_path):
     solved = solve_one(StudyPlan(40, tmp_path), "shear", 1, members=1)
     alone, together = (measure_errors(solved, widened=widened) for widened in (False, True))

@@ -106,7 +106,7 @@ def test_a_wrong_correction_is_named(
         assert part in message
 
 
-@pytest.mark.screen  # many seconds of photographs
+@pytest.mark.thorough  # many seconds of photographs
 def test_lens_distortion_is_removed_from_the_tracks(plain: Tracked, photographed: Path, tmp_path: Path) -> None:
     straight = plain.tracks.frames(0, 2)
     for file in sorted((photographed / "photos").iterdir()):

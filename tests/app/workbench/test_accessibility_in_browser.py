@@ -39,7 +39,7 @@ def enter(tab: Page) -> None:
     idle(tab)
 
 
-@pytest.mark.parametrize("scheme", ["dark", "light"])
+@pytest.mark.parametrize("scheme", ["dark", pytest.param("light", marks=pytest.mark.slow)])
 def test_axe_finds_no_violation_in_any_step(page: Page, solved: Path, scheme: Literal["dark", "light"]):
     axe, found = Axe(), {}
 

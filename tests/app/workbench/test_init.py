@@ -168,7 +168,7 @@ def test_a_folder_is_made_only_for_photographs_that_are_there_and_metres_need_a_
         assert not new.exists()
 
 
-@pytest.mark.screen
+@pytest.mark.thorough
 def test_defaults_choose_channel_and_following_and_state_what_they_saw(tmp_path, capsys):
     discs(tmp_path)
     flags = ("--photographs", "shots/*.png", "--interval", 5, "--pixel-size", 1e-4, "--walls", "none")
@@ -198,7 +198,7 @@ def labelled_discs(folder, radius: float = 24.0) -> np.ndarray:
     return labels
 
 
-@pytest.mark.screen
+@pytest.mark.thorough
 def test_a_video_and_the_rods_of_another_program_make_an_experiment(tmp_path):
     labels = labelled_discs(tmp_path)
     camera = cv2.FileStorage(str(tmp_path / "camera.yml"), cv2.FILE_STORAGE_WRITE)

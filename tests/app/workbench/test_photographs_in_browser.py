@@ -27,6 +27,7 @@ def shown(tab: Page) -> str:
     return tab.evaluate("new URLSearchParams(workbench.stage.wanted.split('?')[1]).get('file')").split("/")[-1]
 
 
+@pytest.mark.slow
 def test_photographs_are_dragged_left_out_and_used_again(page: Page, begun: Path):
     file = begun / "my photographs" / "pictures" / NAMES[2]
     file.write_bytes(file.read_bytes()[:2000])

@@ -232,7 +232,7 @@ def load_toml(folder):
     return tomllib.loads((folder / "experiment.toml").read_text())
 
 
-@pytest.mark.screen
+@pytest.mark.thorough
 def test_the_whole_set_up_gives_what_check_accepts(begun, made_photographs, photographs_only):
     visitor, described = begun
     at, truth = described["at"], load_experiment(made_photographs)

@@ -55,6 +55,7 @@ def test_the_clear_winner_is_named_with_effect_and_cure(scores, monkeypatch):
     assert "Cure: measure the radii anew" in found.sentence()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("gap", [0.005, *(pytest.param(each, marks=pytest.mark.slow) for each in (0.0, -0.005))])
 def test_wrong_radii_that_the_gaps_of_hard_rods_exclude_are_not_named(scores, monkeypatch, gap):
     scores["all_radii"] = 0.8
@@ -71,6 +72,7 @@ def test_the_mean_gap_of_touching_rods_is_over_a_diameter():
     assert change == pytest.approx(0.01, rel=0.2)
 
 
+@pytest.mark.thorough
 def test_a_stretching_that_the_gaps_of_rods_exclude_is_not_named(scores):
     """A wall that lags fits better in a stretched picture, too; the overlaps of soft grains hide a stretching."""
     scores["stretched_picture"] = 0.8
@@ -86,9 +88,7 @@ def test_a_stretching_that_the_gaps_of_rods_exclude_is_not_named(scores):
 
 
 def test_a_stretching_is_sought_in_gaps_without_walls_too():
-    walls = replace(
-        INPUTS.walls, name=(), endpoints=INPUTS.walls.endpoints[:, :0], pressure=INPUTS.walls.pressure[:0]
-    )
+    walls = replace(INPUTS.walls, name=(), endpoints=INPUTS.walls.endpoints[:, :0], pressure=INPUTS.walls.pressure[:0])
     cropped = replace(INPUTS, walls=walls, tracks=replace(INPUTS.tracks, radius=INPUTS.tracks.radius.copy()))
     assert distortion.seeks_distortion(cropped, walls, ())
     periodic = replace(walls, cell=np.ones((INPUTS.tracks.frame_count, 2, 2)))
@@ -133,6 +133,7 @@ def test_noise_that_hides_overlaps_contradicts_nothing():
         assert worst.words.endswith("noise hides the overlaps") != explains
 
 
+@pytest.mark.thorough
 def test_confused_names_are_named_and_hide_nothing_else():
     tracks = INPUTS.tracks
     row = np.tile(np.arange(tracks.grain_count), (tracks.frame_count, 1))

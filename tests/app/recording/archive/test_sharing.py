@@ -134,7 +134,7 @@ def test_a_folder_of_runs_is_one_page_with_a_card_for_each_and_one_viewer(tmp_pa
     assert text.count('id="module"') == 1
 
 
-@pytest.mark.screen
+@pytest.mark.thorough
 def test_the_command_writes_a_small_file_and_a_page_and_prints_their_size(recording, tmp_path, capsys):
     folder = tmp_path / "shear"
     folder.mkdir()
@@ -156,6 +156,7 @@ def test_wrong_arguments_end_with_status_2_and_one_line(recording, arguments, ca
     assert capsys.readouterr().err.count("\n") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.screen
 def test_the_page_draws_the_forces_in_a_browser_without_a_server(results, tmp_path, page):
     # All frames look alike, so that the forces are visible in any frame that the playing viewer shows.

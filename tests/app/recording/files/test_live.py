@@ -186,6 +186,7 @@ def answers(port: int) -> bool:
     return True
 
 
+@pytest.mark.slow
 @pytest.mark.screen
 def test_the_live_page_draws_the_forces_as_they_come(results, tmp_path, page):
     live = LiveRecording(tmp_path / "live.rrd", "web")

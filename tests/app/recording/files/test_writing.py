@@ -71,7 +71,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", "--lazy", str(place)], check=True)
 
 
-@pytest.mark.screen
+@pytest.mark.thorough
 def test_a_full_disk_prevents_the_recording_and_nothing_else(tracked, tmp_path, small_disk):
     out = tmp_path / "out"
     assert rodsight("solve", tracked, "--out", out, *FEW) == 0

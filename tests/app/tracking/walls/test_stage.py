@@ -40,7 +40,7 @@ def test_walls_of_a_table_have_no_sigma(plain: Tracked) -> None:
     assert plain.walls.sigma is None
 
 
-@pytest.mark.screen  # many seconds of photographs
+@pytest.mark.thorough  # many seconds of photographs
 def test_discs_beyond_the_walls_are_no_grains(photographed: Path, tmp_path: Path) -> None:
     table = read_table(photographed / "grains.csv", ("id", "radius"))  # of the truth: the experiment detects
     x, y = _add_a_wheel(photographed, float(np.median(table.numbers("radius"))))
