@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,8 +103,7 @@ class Results:
     @property
     def weight(self) -> Array:
         """Weight of every grain (n, 2) [N], from `material.gravity` of the configuration."""
-        x, y = tomllib.loads(self.configuration).get("material", {}).get("gravity", (0.0, 0.0))
-        return self.grains.weight((float(x), float(y)))
+        return grain_weight(self.grains, self.configuration)
 
     @property
     def force_unit(self) -> str:
@@ -124,3 +123,19 @@ class Results:
         recorded = np.where((self.walls.sides == STRAIGHT)[:, None], self.walls.force, np.nan)
         inferred = np.stack([each.wall_force for each in self.statistics])
         return compare_wall_forces(inferred[1:], recorded[1:], outward_normals(self.walls.endpoints[1:]))
+
+
+def grain_weight(grains: Grains, configuration: str) -> Array:
+    """Return the weight of every grain (n, 2) [N], from `material.gravity` of a configuration; zero if not set."""
+    gravity = setting(configuration, "material", "gravity")
+    x, y = gravity if isinstance(gravity, list) else (0.0, 0.0)
+    return grains.weight((float(x), float(y)))
+
+
+def setting(configuration: str, section: str, key: str) -> Any:
+    """Return one value of a configuration in TOML; None if it is not set or the text is not TOML."""
+    try:
+        part = tomllib.loads(configuration).get(section)
+    except tomllib.TOMLDecodeError:
+        return None
+    return part.get(key) if isinstance(part, dict) else None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,7 +20,7 @@ from ..solver.statistics.agreement import Agreement
 from ..solver.statistics.frame_statistics import FrameStatistics
 from ..tracks import TrackStatus, WallTracks
 from .calibration_summary import calibration_facts, camera_facts
-from .results import Results
+from .results import Results, setting
 from .truth import accuracy
 
 ABOVE = 0.5  # outward normal along the vertical, from which on a wall is above the packing
@@ -222,7 +221,7 @@ def _friction(results: Results) -> dict[str, Any] | None:
 
 def _loads(results: Results) -> list[dict[str, Any]]:
     """Return the load on every plate [N] with what it follows from; measured ones as mean and range."""
-    walls, length, found = results.walls, _material(results).get("length"), []
+    walls, length, found = results.walls, setting(results.configuration, "material", "length"), []
     first = Walls.at_rest(walls.endpoints[0], side=walls.side)
     width = first.face
     free = fraction_on_free_grains(results.grains, first, results.tracks.position[0], results.tracks.present[0])
@@ -259,12 +258,6 @@ def press_from_above(
         return {}
     pressed = np.median(solved, axis=0) / size
     return {walls.name[w]: float(pressed[w]) for w in np.flatnonzero(above & (pressed > ADDED))}
-
-
-def _material(results: Results) -> dict[str, Any]:
-    """Return the material of the resolved configuration; empty where results have none."""
-    section = tomllib.loads(results.configuration).get("material", {})
-    return section if isinstance(section, dict) else {}
 
 
 def _finite(value: Any) -> Any:

@@ -94,7 +94,8 @@ def diagnose(
     walls, failed = complete_walls(restored, inputs.walls)
     if len(failed) == restored.frame_count:
         return names
-    tracks, walls, camera = undistorted(inputs, walls, failed, camera=not undisturbed)
+    sought = not undisturbed and seeks_distortion(inputs, walls, failed)
+    tracks, walls, camera = undistorted(inputs, walls, failed, camera=sought)
     found = [*examine_rotations(tracks, walls), *examine_order(tracks), *examine_smoothing(inputs.tracks)]
     found += examine_walls(tracks, walls) or examine_wall_times(tracks, walls) or examine_wall_places(tracks, walls)
     found += examine_sizes(tracks, walls) or examine_sections(tracks)
@@ -105,8 +106,8 @@ def diagnose(
         found = _examine_sliding(inputs, first)
     if not (found or trial is None or inputs.tracks.grain_count < LEAST_GRAINS):
         # Gaps between hard rods show a stretching by themselves. Where they show none, one that wins moves the walls.
-        sought = undisturbed or seeks_distortion(inputs, walls, failed)
-        excluded = ("stretched_picture",) if sought and not (camera or trial.soft) else ()
+        shown = undisturbed or sought
+        excluded = ("stretched_picture",) if shown and not (camera or trial.soft) else ()
         found = _compare_rivals(inputs, trial, progress, first, excluded)
     if poses and float(impossible.mean()) > FEW_OUTLIERS:  # so many explain it
         found = [each for each in found if each.cause != "not_explained"]

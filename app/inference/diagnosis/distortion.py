@@ -15,17 +15,17 @@ from .causes import finding
 
 
 def undistorted(
-    inputs: Inputs, walls: WallTracks, failed: Collection[int], *, camera: bool = True
+    inputs: Inputs, walls: WallTracks, failed: Collection[int], *, camera: bool | None = None
 ) -> tuple[Tracks, WallTracks, list[Finding]]:
     """Return tracks and walls as a run corrects them for exchanged sizes and the camera, and what it corrects.
 
-    camera: False: its distortion was sought, and there is none.
+    camera: whether to look for its distortion; None: as a run.
     """
     settings, tracks, exchanged = inputs.settings, inputs.tracks, ""
     if settings.calibration is not None:
         tracks, exchanged = correct_exchanged_sizes(tracks, walls)
     named = [finding("exchanged_sizes", exchanged)] if exchanged else []
-    if not (camera and seeks_distortion(inputs, walls, failed)):
+    if not (seeks_distortion(inputs, walls, failed) if camera is None else camera):
         return tracks, walls, named
     tracks, walls, _, found = correct_camera(
         inputs.material, tracks, walls, failed, radii_known=settings.radii_are_known

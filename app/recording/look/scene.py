@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...results.results import TruthContacts
+from ...results.results import TruthContacts, grain_weight, setting
 from ...solver.assessment.fringe_pressures import FringePressures
 from ...solver.bodies.cell import Cell
 from ...solver.bodies.grains import Array, Grains
@@ -59,9 +58,7 @@ class Scene:
     @property
     def weight(self) -> Array:
         """Weight of every grain (n, 2) [N], from `material.gravity` of the configuration; zero if that is not set."""
-        gravity = setting(self.configuration, "material", "gravity")
-        x, y = gravity if isinstance(gravity, list) else (0.0, 0.0)
-        return self.grains.weight((float(x), float(y)))
+        return grain_weight(self.grains, self.configuration)
 
     def body_names(self, bodies: NDArray[np.integer]) -> list[str]:
         """Return the names of bodies by row: the id of a grain, the name of a wall."""
@@ -136,12 +133,3 @@ def tracks_in_cell(tracks: Tracks, walls: WallTracks) -> Tracks:
         Cell.at_rest(cell).wrapped(place) for cell, place in zip(walls.cell, tracks.position, strict=True)
     ])  # fmt: skip
     return replace(tracks, position=inside)
-
-
-def setting(configuration: str, section: str, key: str) -> object | None:
-    """Return one value of a configuration in TOML; None if it is not set or the text is not TOML."""
-    try:
-        part = tomllib.loads(configuration).get(section)
-    except tomllib.TOMLDecodeError:
-        return None
-    return part.get(key) if isinstance(part, dict) else None

@@ -133,9 +133,9 @@ class FilmWriter:
         """Return the offsets of pictures (k,) from the first (k, 2) [px]."""
         canvas = self._scene.canvas
         row, column = np.divmod(pictures, columns)
-        beside = 0.5 * (step_across(canvas, columns) - canvas.width)
-        across = beside + column * step_across(canvas, columns)
-        return np.column_stack([across, row * STEP_DOWN * canvas.height])
+        step = step_across(canvas, columns)
+        beside = 0.5 * (step - canvas.width)
+        return np.column_stack([beside + column * step, row * STEP_DOWN * canvas.height])
 
     def _lines(self, forces: FrameForces, fn: NDArray[np.floating], at: Array, strong: float) -> rr.LineStrips2D:
         """Return the strong contacts of fn (k, c) [N] in pictures at offsets (k, 2) [px], and faint outlines."""

@@ -11,13 +11,14 @@ import numpy as np
 import rerun as rr
 
 from ...drawing.uncertainty import SURE
+from ...results.results import setting
 from ...solver.bodies.grains import Array
 from ...solver.frame_forces import FrameForces, FrameStatus
 from ...solver.statistics.agreement import Agreement
 from ...solver.statistics.frame_statistics import FrameStatistics
 from ..look import entities
 from ..look.printable_text import printable
-from ..look.scene import Scene, setting
+from ..look.scene import Scene
 from ..packing_layers.film import STRONG, STRONG_SWEEPS
 
 MAX_REASONS = 5  # frames whose reasons are listed
@@ -107,17 +108,14 @@ def _counts(scene: Scene, frames: list[FrameSummary]) -> str:
         f"{walls.name[w]} {1e-3 * usual[w]:.4g} kPa{' on average, measured' if np.isnan(walls.pressure[w]) else ''}"
         for w in np.flatnonzero(walls.loaded)
     )
-    if not pressures:
-        scale = "the weight sets the scale" if scene.weight.any() else "forces are known up to a factor"
-        pressures = f"none loaded: {scale}"
-    else:
-        pressures = f"loaded: {pressures}"
+    scale = "the weight sets the scale" if scene.weight.any() else "forces are known up to a factor"
+    loads = f"loaded: {pressures}" if pressures else f"none loaded: {scale}"
     length_given = setting(scene.configuration, "material", "length") is not None
     return (
         f"{scene.tracks.frame_count} frames, {scene.grains.count} rods of {1e3 * scene.rod_length:g} mm"
         f"{'' if length_given else ' (assumed length: the configuration gives none)'}, "
         f"{walls.count} wall{'s' * (walls.count != 1)} "
-        f"({pressures}), "
+        f"({loads}), "
         f"friction {scene.friction:g}. {sum(f.sweeps for f in frames)} sweeps in {len(frames)} frames."
     )
 

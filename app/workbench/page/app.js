@@ -115,11 +115,16 @@ setInterval(() => { if (!document.hidden) listen(); }, 2 * LOOKS);
 addEventListener("unanswered", listen);
 
 /** The state of the experiment after an action that does not answer with it, so that its undo is known. */
-app.refresh = async () => { app.project = await request("project", { at: app.project.at }); useForcesOf(app.project); };
+app.refresh = async () => { hold(await request("project", { at: app.project.at })); };
 
-app.take = (project) => {
+/** Make this the experiment that all steps show. */
+function hold(project) {
   app.project = project;
   useForcesOf(project);
+}
+
+app.take = (project) => {
+  hold(project);
   app.frame = Math.min(app.frame, Math.max(project.frames - 1, 0));
   app.step.taken?.(app);
   app.paint();
@@ -132,8 +137,7 @@ app.open = (project, step = null) => {
   if (project.at !== app.project?.at) { app.stage.clear(); clearPlot(); }
   at("home").hidden = true;
   app.frame = 0; app.looked = 0;
-  app.project = project;
-  useForcesOf(project);
+  hold(project);
   const first = STEPS.find((each) => markOf(each) !== "good" && project.steps.some((s) => s.name === each.name));
   app.go(STEPS.find((each) => each.name === step) ?? first ?? STEPS[0]);
 };
