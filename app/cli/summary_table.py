@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from ..solver.even_subset import even_subset
 from ..solver.frame_forces import FrameStatus
 
 STATUS_STYLE = {
@@ -266,7 +267,7 @@ def _frame_table(summary: dict[str, Any]) -> Table:
         table.add_column("r(f_n)", justify="right", no_wrap=True)
         table.add_column("r(f_t)", justify="right", no_wrap=True)
     total = summary["frame_count"]
-    shown = np.unique(np.linspace(0, total - 1, min(total, MAX_ROWS)).round().astype(int))
+    shown = even_subset(total, MAX_ROWS)
     for k in shown:
         status = summary["status"][k]
         cells = [

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from ..drawing.force_range import ForceRange
 from ..drawing.frame_caption import caption_of_strain
 from ..results.results import Results
+from ..solver.even_subset import even_subset
 from ..solver.frame_forces import FrameStatus
 from .figure_style import INK, VERMILION, Width, new_figure
 from .force_network import bounds_of, draw_network
@@ -50,5 +51,5 @@ def sheet_frames(results: Results, most: int) -> list[int]:
     if len(begins) > most // 2:
         begins = [begins[row] for row in np.linspace(0, len(begins) - 1, most // 2).round().astype(int)]
     rest = [k for k in solved if k not in begins]
-    spaced = np.unique(np.linspace(0, len(rest) - 1, min(most - len(begins), len(rest))).round().astype(int))
+    spaced = even_subset(len(rest), most - len(begins))
     return sorted({*begins, *(rest[row] for row in spaced.tolist())})

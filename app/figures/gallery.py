@@ -15,6 +15,7 @@ from ..inference.zero_start import solve_from_zero
 from ..process.atomic import write_atomically
 from ..results.comparison import compare_runs, compare_with_truth
 from ..results.results import Results, TruthContacts
+from ..solver.even_subset import even_subset
 from ..solver.frame_forces import FrameStatus
 from .contact_sheet import draw_sheet
 from .difference import draw_difference
@@ -198,7 +199,7 @@ def write_paper_set(
     shown = default_frame(results) if frame is None else frame
     if not 0 <= shown < len(results.frames):
         raise IndexError(f"there is no frame {shown}: frames go from 0 to {len(results.frames) - 1}")
-    candidates = np.unique(np.linspace(1, len(results.frames) - 1, ZERO_STARTS).round().astype(int))
+    candidates = 1 + even_subset(len(results.frames) - 1, ZERO_STARTS)
     found = [each for each in solve_from_zero(results, candidates.tolist()) if np.isfinite(each.agreement)]
     if len(found) < 2:
         raise ValueError("fewer than two frames have forces: the paper's figures compare frames")

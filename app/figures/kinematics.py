@@ -12,6 +12,7 @@ from matplotlib.ticker import NullFormatter
 
 from ..results.results import Results
 from ..solver.bodies.grains import Array
+from ..solver.even_subset import even_subset
 from ..solver.kinematics.mean_field import FLUCTUATION_EDGES
 from ..solver.kinematics.sequence_kinematics import SequenceKinematics
 from ..solver.kinematics.spatial_correlation import DISTANCE_EDGES
@@ -121,7 +122,7 @@ def _draw_fluctuations(axes: Axes, results: Results, frame: int, found: Sequence
 
 def _shown_windows(found: SequenceKinematics) -> list[int]:
     count = len(found.window_frames)
-    return np.unique(np.linspace(0, count - 1, min(SHOWN_WINDOWS, count)).round().astype(int)).tolist()
+    return even_subset(count, SHOWN_WINDOWS).tolist()
 
 
 def _draw_distribution(axes: Axes, found: SequenceKinematics) -> None:

@@ -20,6 +20,8 @@ from ..experiment.pictures.image import Image, ImageSelection
 from ..experiment.plausibility import rim_points
 from ..solver.bodies.grains import Array
 from ..solver.boundary.size_classes import group_readings
+from ..solver.even_subset import even_subset
+from ..solver.robust_scale import SD_OVER_MAD
 from .detection.detect import Detection, DetectionSettings, MissedGrainSearch, detect_grains
 
 SMALLEST = 0.05  # quantile of the radii below which nothing is looked for
@@ -159,7 +161,7 @@ def _looks_of(image: Image, rods: Array) -> tuple[Array, Array] | None:
     if len(look) < FEWEST:
         return None
     middle = np.median(look, axis=0)
-    return middle, 1.4826 * np.median(np.abs(look - middle), axis=0) + LEAST_SD
+    return middle, SD_OVER_MAD * np.median(np.abs(look - middle), axis=0) + LEAST_SD
 
 
 def _are_alike(image: Image, discs: Array, part: float, looks: tuple[Array, Array]) -> NDArray[np.bool_]:
@@ -206,7 +208,7 @@ def _find_pores(free: NDArray[np.uint8], scale: float, corner: Array, smallest: 
     low, high = PORE[0] * smallest, PORE[1] * smallest
     highest = (distance == cv2.dilate(distance, np.ones((3, 3), np.uint8))) & (radius < high)
     row, column = np.nonzero(highest & (radius >= max(low, NARROWEST)))
-    chosen = np.unique(np.linspace(0, len(row) - 1, MOST_PORES).round().astype(int)) if len(row) else row
+    chosen = even_subset(len(row), MOST_PORES)
     row, column = row[chosen], column[chosen]
     place = np.column_stack([column, row]) / scale + corner
     return np.column_stack([place, radius[row, column].astype(np.float64)])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..experiment.pictures.image import FULL_SCALE, Image
 from ..solver.bodies.grains import Array
+from ..solver.even_subset import even_subset
 from .correlation.noise import image_noise
 from .correlation.patches import Patches
 from .correlation.splines import Pyramid
@@ -134,10 +135,10 @@ def measure_pictures(
     InputError
         If a photograph cannot be read.
     """
-    frames = np.unique(np.linspace(0, len(photographs) - 1, SAMPLED_FRAMES).round().astype(np.int64))
+    frames = even_subset(len(photographs), SAMPLED_FRAMES)
     first = photographs[0]
     if centre is not None and radius is not None and len(radius):
-        sample = np.unique(np.linspace(0, len(radius) - 1, MAX_DISCS).round().astype(np.intp))
+        sample = even_subset(len(radius), MAX_DISCS)
         places, patch_radius = centre[sample], TrackingSettings().patch_fraction * radius[sample]
         rods = True
     else:
@@ -172,7 +173,7 @@ def _grid_discs(image: Image) -> tuple[Array, Array]:
         image[int(v) - half : int(v) + half, int(u) - half : int(u) + half].std() for u, v in places
     ])  # fmt: skip
     chosen = places[contrast >= np.median(contrast)] if len(places) else np.array([[0.5 * width, 0.5 * height]])
-    sample = np.unique(np.linspace(0, len(chosen) - 1, MAX_DISCS).round().astype(np.intp))
+    sample = even_subset(len(chosen), MAX_DISCS)
     return chosen[sample], np.full(len(sample), DEFAULT_RADIUS)
 
 

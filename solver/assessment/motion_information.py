@@ -22,6 +22,7 @@ from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts
 from ..contacts.kinematics import relative_motion
 from ..detection.displacement import displacement_scale
+from ..robust_scale import SD_OVER_MAD
 from ..statistics.force_statistics import mean_normal_force
 
 DETECTABLE = 3.0  # standard deviations of a measured sliding beyond which it is detected
@@ -34,7 +35,6 @@ MOST_BY_LOOSE = 2.0
 # freely, and bears a little at a wall or a neighbour, makes it infinite.
 FEW, MOST_BY_FEW = 0.03, 3.0
 FEWEST_STRONG = 10  # of them, whose gaps are compared
-ROBUST = 1.4826  # standard deviation over the median absolute deviation of a Gaussian
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +183,7 @@ def _beyond_noise(gap: Array, strong: _StrongGaps, noise: float) -> float:
     """Robust standard deviation of the gaps of strong contacts [m], noise subtracted."""
     if len(gap) < FEWEST_STRONG:
         return np.nan
-    variance = (ROBUST * np.median(np.abs(gap - np.median(gap)))) ** 2
+    variance = (SD_OVER_MAD * np.median(np.abs(gap - np.median(gap)))) ** 2
     expected = noise**2 * np.where(strong.with_wall, 1.0, 2.0).mean()
     return float(np.sqrt(max(variance - expected, 0.0)))
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bodies.grains import Array
+from ..even_subset import even_subset
 from ..quantity import Quantity
 from .touching_pairs import TouchingFit, count_classes, find_near_pairs, fit_touching_pairs
 
@@ -220,7 +221,7 @@ def find_camera_distortion(
     middle = 0.5 * (present.min(axis=0) + present.max(axis=0))
     count = min(max(min(MOST_FRAMES, MOST_POSES // len(radius)), FEWEST_FRAMES), len(position))
     reading = _Reading(
-        position[np.unique(np.linspace(0, len(position) - 1, count).astype(int))],
+        position[even_subset(len(position), count)],
         radius, size_class, middle, 0.5 * float(np.ptp(present, axis=0).max()),
     )  # fmt: skip
     pairs = reading.find_pairs(None)

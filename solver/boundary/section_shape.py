@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bodies.grains import Array
+from ..even_subset import even_subset
 from .touching_pairs import find_near_pairs
 
 MOST_FRAMES = 6  # that are read, evenly over the sequence
@@ -61,7 +62,7 @@ def measure_section_shape(position: Array, radius: Array) -> SectionShape:
     """
     n = len(radius)
     normal, right, variance = np.zeros((BLOCKS, 3, 3)), np.zeros((BLOCKS, 3)), []
-    for k in np.unique(np.linspace(0, len(position) - 1, MOST_FRAMES).round().astype(np.int64)):
+    for k in even_subset(len(position), MOST_FRAMES):
         gap, angle, rod = _gaps_of_rods(position[k], radius)
         if len(gap) < 2 * FEWEST_GAPS:
             continue

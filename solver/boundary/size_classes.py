@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ..bodies.grains import Array
+from ..even_subset import even_subset
 from .touching_pairs import count_classes, find_near_pairs, fit_touching_pairs
 
 MIN_GAP, MAX_RANGE = 0.1, 0.12  # over the mean radius: between sizes, and of the readings of one size
@@ -105,7 +106,7 @@ def find_size_classes(position: Float[Array, "f n 2"], radius: Float[Array, " n"
     deviation = radius - size[size_class]
     if not np.abs(deviation).max() > 1e-9 * radius.mean():
         return None
-    rows = np.unique(np.linspace(0, len(position) - 1, min(MOST_FRAMES, len(position))).astype(int))
+    rows = even_subset(len(position), MOST_FRAMES)
     gap, design = [], []
     for place in position[rows]:
         near = find_near_pairs(place, radius)

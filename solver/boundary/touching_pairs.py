@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import KDTree
 
 from ..bodies.grains import Array
+from ..robust_scale import SD_OVER_MAD
 
 WIDEST = 0.15  # mean diameters: gap of a pair that may touch although it is distorted
 FIRST_QUANTILE = 0.2  # of all gaps: where touching ones are looked for first
@@ -17,7 +18,6 @@ NEAR_WIDTH = 0.04  # mean diameters: where the solution is nearly known
 ROUNDS = 30
 CONVERGED = 1e-3  # scatters: change of a residual in a round
 NARROWEST = 1e-6  # mean diameters: width for gaps without any error
-MAD_TO_SD = 1.4826  # median of the absolute value to the standard deviation of a normal distribution
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,11 +108,11 @@ def fit_touching_pairs(
         value = -np.linalg.lstsq(normal, design.T @ (weight * gap), rcond=None)[0]
         before, residual = residual, gap + design @ value
         overlaps = residual[(residual < 0.0) & (residual > -WIDEST * diameter)]
-        scatter = MAD_TO_SD * float(np.median(-overlaps)) if len(overlaps) else 0.0
+        scatter = SD_OVER_MAD * float(np.median(-overlaps)) if len(overlaps) else 0.0
         last, width = width, max(SHRINK * width, LAST_WIDTH * scatter, NARROWEST * diameter)
         if width > SHRINK * last and float(np.abs(residual - before).max()) < CONVERGED * scatter:
             break
     sd = scatter * np.sqrt(frames * np.diag(np.linalg.pinv(normal)))
     return TouchingFit(
-        np.asarray(value, np.float64), sd, scatter, MAD_TO_SD * float(np.median(np.abs(residual))), residual, weight
+        np.asarray(value, np.float64), sd, scatter, SD_OVER_MAD * float(np.median(np.abs(residual))), residual, weight
     )

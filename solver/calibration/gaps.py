@@ -13,6 +13,7 @@ from ..bodies.cell import Cell, reduce_vectors
 from ..bodies.disc_pairs import find_disc_pairs
 from ..bodies.grains import Array
 from ..bodies.wall_shapes import STRAIGHT, Sides, all_sides, faces_walls, wall_distance
+from ..even_subset import even_subset
 
 TINY = 1e-300  # [m] avoids division by a distance of zero
 
@@ -45,7 +46,7 @@ class MeasuredSequence:
     def spread_frames(self, count: int) -> NDArray[np.int64]:
         """Choose at most `count` frames, evenly spaced, the first and the last included."""
         f = self.frame_count
-        return np.unique(np.linspace(0, f - 1, min(f, count)).round().astype(np.int64))
+        return even_subset(f, count)
 
     def thinned(self, count: int) -> MeasuredSequence:
         """Select at most `count` frames, evenly spaced."""

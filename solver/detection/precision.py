@@ -16,13 +16,14 @@ import numpy as np
 from ..bodies.grains import Array, Grains
 from ..bodies.motion import Snapshot
 from ..contacts.contacts import detect_contacts, measure_contacts
+from ..even_subset import even_subset
+from ..robust_scale import SD_OVER_MAD
 
 REACH = 0.02  # [mean diameter] greatest gap of a pair that is used
 MIN_GAPS = 200  # fewer give no estimate
 TRIPLES = 24  # number of photographs used, evenly spaced: at most so many, …
 POSES = 10_000  # … and as many as show so many grains, of which the standard deviation is known within 1 %
 FEWEST_TRIPLES = 4
-NORMAL = 1.4826  # standard deviation over median absolute deviation
 VARIANCE_ERROR = 0.1  # relative uncertainty of the noise variance that is subtracted
 CONTRADICTION = 1.3  # ratio of measured and stated precision above which the measured one is used
 
@@ -51,7 +52,7 @@ def measure_precision(grains: Grains, snapshots: Sequence[Snapshot]) -> Precisio
     """
     if len(snapshots) < 3:
         return None
-    middles = np.unique(np.linspace(1, len(snapshots) - 2, min(_triple_count(grains), len(snapshots) - 2)).astype(int))
+    middles = 1 + even_subset(len(snapshots) - 2, _triple_count(grains))
     gaps = np.concatenate([_consecutive_gaps(grains, snapshots[k - 1 : k + 2]) for k in middles], axis=1)
     mean = gaps.mean(axis=0)
     gaps, mean = gaps[:, mean <= 0.0], mean[mean <= 0.0]
@@ -66,7 +67,7 @@ def measure_precision(grains: Grains, snapshots: Sequence[Snapshot]) -> Precisio
 
 def noise_by_second_changes(change: Array) -> float:
     """Robust standard deviation of a position component [m] by second changes of gaps g₋ − 2g + g₊ [m]."""
-    return NORMAL * float(np.median(np.abs(change))) / np.sqrt(12.0)
+    return SD_OVER_MAD * float(np.median(np.abs(change))) / np.sqrt(12.0)
 
 
 def _triple_count(grains: Grains) -> int:

@@ -18,9 +18,9 @@ from scipy.spatial import KDTree
 from ..bodies.grains import Array, Grains
 from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts, detect_contacts, measure_pairs
+from ..robust_scale import SD_OVER_MAD
 
 NEIGHBOURS = 8  # whose median motion a grain follows
-ROBUST = 1.4826  # standard deviation over the median absolute deviation of a Gaussian
 REACH = 0.1  # of a mean radius: greatest gap of a pair that determines a place
 CURVATURE = 0.3  # of a gap: by so much it departs from its interpolation, standard deviation
 ROUNDS = 6  # of Gauss-Newton steps
@@ -80,7 +80,7 @@ def interpolate_poses(time: Array, position: Array, k: int, row: NDArray[np.intp
         deviation = position[k][near] - line[near]
         middle = np.median(deviation, axis=1)
         place[these] = line[row[these]] + middle
-        sd[these] = ROBUST * np.median(np.abs(deviation - middle[:, None]), axis=1).mean(axis=1)
+        sd[these] = SD_OVER_MAD * np.median(np.abs(deviation - middle[:, None]), axis=1).mean(axis=1)
     return InterpolatedPoses(k, row, before, after, fraction, place, sd)
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..bodies.grains import Array
 from ..bodies.wall_shapes import Sides
+from ..even_subset import even_subset
 from .surroundings import Surroundings
 
 MISFIT = 5.0  # standard deviations of a gap: tolerance of contact with the rod …
@@ -146,7 +147,7 @@ def _with(
 def _propose(around: Surroundings, sizes: Array, near: Array | None, tolerance: _Tolerance) -> list[_Rod]:
     """List all rods with at least three contacts in some photograph, tracked; near (f, q, 2): only around these."""
     proposed: list[_Rod] = []
-    for k in np.unique(np.linspace(0, around.frame_count - 1, STARTS).round().astype(int)).tolist():
+    for k in even_subset(around.frame_count, STARTS).tolist():
         for size in sizes.tolist():
             for place in around.find_places(
                 k, size, tolerance.apart, tolerance.deep, None if near is None else near[k]

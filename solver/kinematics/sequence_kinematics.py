@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..bodies.cell import Cell
 from ..bodies.grains import Array
 from ..bodies.strain import logarithmic_strain, shear_strain
+from ..even_subset import even_subset
 from ..quantity import Quantity, columns
 from .local_density import local_solid_fraction, triangulate
 from .local_motion import measure_local_motion
@@ -215,7 +216,7 @@ def _fluctuations(position: Array, begin: int, length: int, cells: list[Cell] | 
 
 def _begins(last: int, length: int, count: int) -> list[int]:
     """Return at most `count` first frames of windows, evenly spaced."""
-    return np.unique(np.linspace(0, last - length, count).astype(int)).tolist()
+    return even_subset(last - length + 1, count).tolist()
 
 
 def _rms(component: Array) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..bodies.grains import Array
+from ..even_subset import even_subset
 from ..posterior.frame_posterior import FramePosterior, infer_frame
 from ..posterior.fringe_calibration import FringeCalibration, FringeReading, calibrate_fringes, with_scale_of
 from ..posterior.sequence_evidence import SequenceEvidence
@@ -45,7 +46,7 @@ def calibrate_sequence_fringes(
     seen = [k for k, each in enumerate(fringes) if each is not None and np.isfinite(each).any()]
     if not seen:
         return evidence, None
-    rows = [seen[k] for k in np.unique(np.linspace(0, len(seen) - 1, min(FRAMES, len(seen))).astype(int))]
+    rows = [seen[k] for k in even_subset(len(seen), FRAMES)]
     without = evidence.without_overlaps()
     estimates = [_estimate(each, rows, None, 0, workers) for each in (evidence, without)]
     used = [_readings(evidence, each) for each in estimates]

@@ -16,6 +16,7 @@ from ..bodies.grains import Array
 from ..bodies.motion import Snapshot
 from ..bodies.packing import Packing
 from ..calibration.weights import NORMAL_MEDIAN
+from ..even_subset import even_subset
 from .posterior_settings import PosteriorSettings
 from .sampler.chain import ChainMeans, make_sampler_grains, make_sampler_pairs, make_schedule, run_chain
 from .sampler.records import SamplerGrains, SamplerPairs
@@ -81,7 +82,7 @@ def estimate_radii(
     With D the mean diameter, the correction is D E[δ] plus the error that all gaps share; its standard deviation is
     min(3 D √Var(δ), max(σ_r, D √⟨E[δ²]⟩)), with 3 the RADIUS_COVERAGE_FACTOR.
     """
-    rows = np.unique(np.linspace(0, len(snapshots) - 1, min(FRAMES, len(snapshots))).astype(int))
+    rows = even_subset(len(snapshots), FRAMES)
     evidence = gather_position_evidence(packing, snapshots, settings, shared_error=shared_error)
     shared, sd = evidence.radius_correction, evidence.radius_sd
     if not _is_detectable(evidence):

@@ -20,6 +20,7 @@ from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts, measure_pairs
 from ..contacts.pairs import Keys, are_among
 from ..contacts.verdicts import NO_VERDICTS, Verdicts
+from ..even_subset import even_subset
 from .candidate_gaps import OPEN_REACH, find_candidate_gaps, pair_covariates
 from .error_variances import ErrorVariances, estimate_error_variances
 from .frame_evidence import FrameEvidence, KnownForces
@@ -234,7 +235,7 @@ def _error_variances(
     gap, reach = smooth
     between = np.flatnonzero(~series.with_wall)
     covariate = pair_covariates(packing, snapshots, series)[between]
-    rows = np.unique(np.linspace(0, len(snapshots) - 1, min(VARIANCE_FRAMES, len(snapshots))).astype(int))
+    rows = even_subset(len(snapshots), VARIANCE_FRAMES)
     gap = gap[np.ix_(rows, between)]
     rest = gap - touching.mean_at(covariate)
     sampled = replace(touching, touching_fraction=touching.touching_fraction[rows])

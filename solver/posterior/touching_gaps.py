@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..bodies.grains import Array
+from ..even_subset import even_subset
 from ..parallel import parallel_map
 from .touching_kernels import accumulate_gaps, compute_touch_probabilities
 
@@ -95,7 +96,7 @@ def fit_touching(gap: Array, covariate: Array, reach: float, narrow_sd: float) -
         (float(np.quantile(g, START_QUANTILE)), narrow_sd),
         (float(np.median(g)), max(0.75 * float(high - low), narrow_sd)),
     )
-    rows = np.unique(np.linspace(0, len(gap) - 1, min(SEARCH_FRAMES, len(gap))).astype(int))
+    rows = even_subset(len(gap), SEARCH_FRAMES)
     thinned = len(rows) < len(gap)
     tolerance = SEARCH_TOLERANCE if thinned else TOLERANCE
     tasks = [

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...solver.detection.displacement import displacement_scale
+from ...solver.even_subset import even_subset
 from ...solver.part_settings import SLIP_SIGMAS
 from ...tracks import Tracks
 
@@ -79,7 +80,7 @@ def _displacement(tracks: Tracks, span: int) -> float:
     """Median displacement scale [m] over several intervals of so many photographs; NaN: none can be read."""
     position = np.where(tracks.present[..., None], tracks.position, np.nan)
     sigma = np.where(tracks.present, tracks.sigma, 0.0)
-    begins = np.unique(np.linspace(0, tracks.frame_count - 1 - span, SAMPLES).astype(int))
+    begins = even_subset(tracks.frame_count - span, SAMPLES)
     scales = []
     for k in begins.tolist():
         both = np.isfinite(position[k, :, 0]) & np.isfinite(position[k + span, :, 0])

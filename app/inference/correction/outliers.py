@@ -13,7 +13,8 @@ from ...solver.bodies.rods import RodMaterial
 from ...solver.bodies.walls import Walls
 from ...solver.contacts.contacts import Contacts, detect_contacts, measure_pairs
 from ...solver.inferred.exchanged_ids import find_exchanged_ids
-from ...solver.inferred.interpolated_poses import NEIGHBOURS, ROBUST, interpolate_poses, neighbour_rows
+from ...solver.inferred.interpolated_poses import NEIGHBOURS, interpolate_poses, neighbour_rows
+from ...solver.robust_scale import SD_OVER_MAD
 from ...tracks import Tracks, TrackStatus, WallTracks
 
 JUMP = 6.0  # robust standard deviations of a rod's deviation from its neighbours beyond which it jumps …
@@ -206,7 +207,7 @@ class _Search:
         known = np.isfinite(self._jump[k, :, 0])
         if not known.any():
             return known
-        sd, noise = ROBUST * float(np.median(self._deviation[k][known])), NOISE * self._tracks.sigma[k]
+        sd, noise = SD_OVER_MAD * float(np.median(self._deviation[k][known])), NOISE * self._tracks.sigma[k]
         bodies = walls_in(self._walls, k)
         return self._returns(k, JUMP * sd, noise, bodies) | self._is_impossible(k, BLAMED * sd, noise, bodies)
 
@@ -237,7 +238,7 @@ class _Search:
             return found
         depth = _greatest_overlap(near, found)[np.isfinite(position[k, :, 0])]
         middle = float(np.median(depth))
-        spread = ROBUST * float(np.median(np.abs(depth - middle)))
+        spread = SD_OVER_MAD * float(np.median(np.abs(depth - middle)))
         deep = middle + DEEP * spread + float(np.nanmedian(noise))
         near = near.select(near.gap < -deep)
         beside = [each for each in (k - 1, k + 1) if 0 <= each < len(position)]

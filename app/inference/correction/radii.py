@@ -21,6 +21,7 @@ from ...solver.boundary.exchanged_sizes import find_exchanged_sizes
 from ...solver.boundary.size_classes import find_size_classes
 from ...solver.calibration.calibrate import Calibration
 from ...solver.contacts.contacts import detect_contacts
+from ...solver.even_subset import even_subset
 from ...solver.part_settings import CalibrationSettings
 from ...solver.posterior.radius_posterior import RadiusPosterior, estimate_radii, has_radius_errors, share_errors
 from ...tracks import Tracks, WallTracks
@@ -192,7 +193,7 @@ def find_wrong_sizes(tracks: Tracks, walls: WallTracks | None, failed: Collectio
 def _frames_read(tracks: Tracks) -> NDArray[np.int64]:
     """Choose at most READ photographs, evenly spaced."""
     count = tracks.frame_count
-    return np.unique(np.linspace(0, count - 1, min(count, READ)).round().astype(np.int64))
+    return even_subset(count, READ)
 
 
 def find_oversized_rods(tracks: Tracks) -> dict[int, float]:

@@ -14,6 +14,7 @@ from ...solver.bodies.rods import RodMaterial
 from ...solver.bodies.strain import displacement_gradient, inertial_time, shear_strain
 from ...solver.bodies.wall_shapes import STRAIGHT, outward_normals
 from ...solver.contacts.contacts import detect_contacts
+from ...solver.even_subset import even_subset
 from ...solver.inferred.unknown_rotations import fill_unknown_rotations
 from ...solver.statistics.agreement import pearson, ranks
 from ...tracks import Tracks, WallTracks
@@ -72,7 +73,7 @@ def examine_rotations(tracks: Tracks, walls: WallTracks) -> list[Finding]:
         return [finding("rotation_zero", "no rod rotates in any photograph")]
     apart = max((tracks.frame_count - 1) // span, 1)  # steps that do not overlap: their errors are independent
     steps = min(max(ROTATING_POSES // tracks.grain_count, FEWEST_STEPS), apart)
-    chosen = np.unique(np.linspace(0, len(stated) - 1, steps).round().astype(int))
+    chosen = even_subset(len(stated), steps)
     inferred = np.array([_rolled(tracks, walls, k, k + span) for k in chosen.tolist()])
     stated, known = stated[chosen], known[chosen] & np.isfinite(inferred)
     stated, inferred = stated[known], inferred[known]

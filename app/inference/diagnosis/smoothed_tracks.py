@@ -12,8 +12,10 @@ from ...solver.assessment.penalties import limit_trust
 from ...solver.bodies.grains import Array
 from ...solver.bodies.rods import RodMaterial
 from ...solver.contacts.contacts import detect_contacts
-from ...solver.detection.precision import NORMAL, noise_by_second_changes
+from ...solver.detection.precision import noise_by_second_changes
+from ...solver.even_subset import even_subset
 from ...solver.frame_forces import FrameForces
+from ...solver.robust_scale import SD_OVER_MAD
 from ...tracks import Tracks, TrackStatus
 from ..correction.outliers import walls_in
 from .causes import finding
@@ -116,7 +118,7 @@ def measure_gap_changes(tracks: Tracks) -> GapChanges | None:
     if f < FEWEST_PHOTOGRAPHS:
         return None
     length = min(WINDOW, f)
-    starts = np.unique(np.linspace(0, f - length, WINDOWS).round().astype(int)).tolist()
+    starts = even_subset(f - length + 1, WINDOWS).tolist()
     windows = [np.diff(_neighbouring_gaps(tracks, first, first + length), axis=0) for first in starts]
     quiet = np.concatenate([change[:, _rests(change)] for change in windows], axis=1)
     second, second_of_all = np.diff(quiet, axis=0), np.diff(np.concatenate(windows, axis=1), axis=0)
@@ -159,7 +161,7 @@ def _rests(change: Array) -> NDArray[np.bool_]:
 def _correlation(values: Array, lag: int) -> float:
     """Correlation of values (f, p) of mean zero with those `lag` rows later; NaN where there are none, or all rest."""
     known = values[np.isfinite(values)]
-    limit = CLIP * NORMAL * float(np.median(np.abs(known))) if len(known) else 0.0
+    limit = CLIP * SD_OVER_MAD * float(np.median(np.abs(known))) if len(known) else 0.0
     if not limit > 0.0:
         return float("nan")
     clipped = np.clip(values, -limit, limit)

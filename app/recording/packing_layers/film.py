@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...drawing.frame_caption import caption_of_strain, caption_of_trust
 from ...solver.bodies.grains import Array
 from ...solver.bodies.wall_shapes import STRAIGHT
+from ...solver.even_subset import even_subset
 from ...solver.frame_forces import FrameForces
 from ..look import entities
 from ..look.axes import log_texts
@@ -38,7 +39,7 @@ STRONG_SWEEPS = 1.5  # times the mean f_n of the run: the least force drawn in p
 
 def film_frames(frame_count: int) -> NDArray[np.int64]:
     """Return the frames that have a picture, including the first and the last."""
-    return np.unique(np.round(np.linspace(0, frame_count - 1, min(frame_count, PICTURES))).astype(np.int64))
+    return even_subset(frame_count, PICTURES)
 
 
 def film_bounds(canvas: Canvas, columns: int) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -118,7 +119,7 @@ class FilmWriter:
 
     def _log_sweeps(self, clock: Clock, forces: FrameForces) -> None:
         rows, fn, _ = visible_sweeps(forces, clock.last - clock.first, SweepChoice.LOG, SWEEP_PICTURES * 4)
-        chosen = np.unique(np.round(np.linspace(0, len(rows) - 1, min(len(rows), SWEEP_PICTURES))).astype(np.int64))
+        chosen = even_subset(len(rows), SWEEP_PICTURES)
         at = self._places(np.arange(len(chosen)), SWEEP_COLUMNS)
         names = [f"sweep {row + 1}" for row in rows[chosen].tolist()]
         names[-1] = "reported"

@@ -15,6 +15,7 @@ from ...process.frame_range import FrameRange
 from ...solver.bodies.grains import Array
 from ...solver.contacts.contacts import measure_pairs
 from ...solver.contacts.pairs import are_among, are_present, join_keys, match_values
+from ...solver.even_subset import even_subset
 from ...verdicts.decisions import Decisions, decide
 from ..reviewed_run import ReviewedRun
 from .candidate_pairs import CandidatePairs, find_candidate_pairs, walls_at
@@ -173,7 +174,7 @@ def print_score(console: Console, score: VerdictScore, fitted: ThresholdFit | No
     curve = Table(title="Touching below a gap of", box=None, header_style="bold")
     for heading in ("gap [µm]", "precision", "recall", "F1"):
         curve.add_column(heading, justify="right")
-    for row in np.unique(np.linspace(0, len(score.curve.threshold) - 1, _CURVE_ROWS).round().astype(int)):
+    for row in even_subset(len(score.curve.threshold), _CURVE_ROWS):
         cells = (f"{getattr(score.curve, name)[row]:.3f}" for name in ("precision", "recall", "f1"))
         curve.add_row(f"{1e6 * score.curve.threshold[row]:.1f}", *cells)
     console.print(curve)

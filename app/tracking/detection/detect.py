@@ -17,6 +17,7 @@ from scipy.spatial import KDTree
 
 from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
+from ...solver.robust_scale import SD_OVER_MAD
 from ..correlation.edge_width import SharpCopy, sharpest_copy
 from .circle_measurement import CircleMeasurer, MeasuredCircle
 from .discs import OVERLAP, Discs, find_discs
@@ -272,7 +273,7 @@ def _refine(measurer: CircleMeasurer, x: Array, y: Array, radius: Array, *, fixe
     excess = free[:, 2] - radius
     shift = float(np.median(excess))
     # The rims' shading differs from grain to grain, so their radii deviate from the common shift.
-    radius_sd = max(1.4826 * float(np.median(np.abs(excess - shift))), 0.01)
+    radius_sd = max(SD_OVER_MAD * float(np.median(np.abs(excess - shift))), 0.01)
     known = np.column_stack([free[:, :2], radius])
     tied = _better(measurer, free, measurer.measure_closely(_close(known, shift, radius_sd), width))
     return Detection(tied[:, 0], tied[:, 1], radius, tied[:, 3], tied[:, 4])

@@ -22,6 +22,7 @@ from numba import njit
 
 from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
+from ...solver.robust_scale import SD_OVER_MAD
 from ..short_sort import median
 
 # Fitted part of a ray and range of its dark [px from the edge], and the same in widths of the blur where that is more:
@@ -153,7 +154,7 @@ def _robust_regression(design, value, strength):
             modelled = design[p, 0] * answer[0] + design[p, 1] * answer[1] + design[p, 2] * answer[2]
             residual[p] = value[p] - modelled
             size[p] = abs(residual[p])
-        scale = max(1.4826 * median(size), 1e-3)
+        scale = max(SD_OVER_MAD * median(size), 1e-3)
         # A prior as wide as usual shading prevents a false one from half an outline.
         prior = (scale / 0.3) ** 2
         n00, n01, n02, n11, n12, n22 = prior, 0.0, 0.0, prior, 0.0, prior

@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull
 
 from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
+from ...solver.even_subset import even_subset
 
 BLUR = 1.5  # [px] standard deviation of the smoothing: paint is finer than a bar
 SPACING = 2.0  # [px] between profiles along a line
@@ -159,7 +160,7 @@ def _fit_line(x: Array, y: Array, *, consensus: bool) -> Array:
     """Offset and slope of a line: by least squares, or with consensus the line through two points near most points."""
     if not consensus:
         return np.asarray(np.polynomial.polynomial.polyfit(x, y, 1), dtype=np.float64)
-    few = np.unique(np.linspace(0, len(x) - 1, min(len(x), 40)).astype(int))
+    few = even_subset(len(x), 40)
     i, j = np.triu_indices(len(few), 1)
     a, b = few[i], few[j]
     slope = (y[b] - y[a]) / np.where(x[b] != x[a], x[b] - x[a], 1.0)

@@ -259,7 +259,8 @@ app.timeline = () => {
       slider, h("div", { class: "row tools" }, h("span", { class: "soft", id: "frame-file" }), sheetButton(app, null, null)));
   }
   at("frame-name").textContent = `photograph ${app.frame} of ${count - 1}`;
-  at("frame-file").textContent = `${project.files[app.frame]}${interval ? ` · ${digits(interval * ((project.series.number[app.frame] ?? app.frame) - (project.series.number[0] ?? 0)), 4)} s` : ""}`;
+  const number = project.series.number, passed = interval ? digits(interval * ((number[app.frame] ?? app.frame) - (number[0] ?? 0)), 4) : "";
+  at("frame-file").textContent = [project.files[app.frame], passed && `${passed} s`].filter(Boolean).join(" · ");
 };
 
 app.show = (frame) => {

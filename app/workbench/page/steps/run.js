@@ -33,7 +33,7 @@ export const run = {
           h("div", { class: "meter" }, h("i", { style: { width: `${100 * stage.done / Math.max(stage.total, 1)}%` } }))))) : null,
       job?.alarms.length ? h("div", { class: "messages" }, job.alarms.slice(-5).map((each) => h("p", {}, h("span", { class: "sign doubtful" }, "!"), `Frame ${each.frame}: ${each.alarm}`))) : null,
       facts ? [h("h2", {}, facts.provisional ? "So far" : "Found"),
-        fact("frames", facts.first ? `photographs ${facts.first} to ${facts.count - 1} of ${project.files.length}` : `${facts.count} of ${project.files.length}`),
+        fact("frames", `${facts.first ? `${facts.first} to ${facts.count - 1}` : facts.count} of ${project.files.length || project.frames}`),
         solved(app) ? [fact("status", facts.status[app.frame]), fact("trust", digits(facts.trust[app.frame], 2)), fact("contacts", String(facts.contacts[app.frame])), fact("mean f_n", force(facts.mean_fn[app.frame])), fact("friction angle", `${digits(facts.friction_angle[app.frame], 3)}°`), fact("rods lost", String(facts.lost[app.frame]))] : null] : null,
       job?.messages.length ? [h("h2", {}, "Messages"), h("div", { class: "log", id: "log", tabIndex: 0, role: "log", "aria-label": "Messages of the run" }, job.messages.slice(-40).join("\n"))] : null,
     ];
