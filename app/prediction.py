@@ -48,6 +48,10 @@ NOT_PREDICTED = (
     "The accuracy of the forces is not predicted: a prediction needs grains and walls seen in two consecutive "
     "photographs."
 )
+NOT_PREDICTED_OF_ONE = (
+    "The accuracy of the forces is not predicted: one photograph shows no motion, and their trust is at most "
+    f"{TRUST_OF_FEW:g}. Take more photographs."
+)
 NO_FORCES = (
     "Something is wrong: no forces of the first photographs are in equilibrium. Check radii, walls and loads, and "
     "whether rods are missing."
@@ -145,6 +149,8 @@ def predict_accuracy(
     quality = measure_data_quality(tracks, walls)
     if walls is None:
         return Prediction(quality, None)
+    if tracks.frame_count == 1:
+        return Prediction(quality, None, NOT_PREDICTED_OF_ONE)
     inputs = Inputs(tracks, walls, material_of(config), settings_of(config))
     try:
         trial = solve_trial(inputs, PREDICTED_PHOTOGRAPHS, InferenceObserver(progress))

@@ -209,16 +209,18 @@ def weight_line(summary: dict[str, Any]) -> str:
 
 
 def _penalty_line(summary: dict[str, Any]) -> list[str]:
-    """Name the largest penalty of the frame with the lowest trust."""
-    penalised = [
-        (t, k)
-        for k, t in enumerate(summary["trust"])
-        if t is not None and summary.get("trust_penalties", [])[k : k + 1] != [""]
-    ]
+    """State the lowest trust, and the largest penalty there, or of the least trusted frame that has one."""
+    known = [(t, k) for k, t in enumerate(summary["trust"]) if t is not None]
+    if not known:
+        return []
+    trust, frame = min(known)
+    reasons = summary.get("trust_penalties", [])
+    penalised = [(t, k) for t, k in known if any(reasons[k : k + 1])]
     if not penalised:
         return []
-    trust, frame = min(penalised)
-    return [f"Lowest trust {trust:.2f} in frame {frame}: {escape(summary['trust_penalties'][frame])}."]
+    least, of = min(penalised)
+    other = "" if of == frame else f"; {least:.2f} in frame {of}"
+    return [f"Lowest trust {trust:.2f} in frame {frame}{other}: {escape(reasons[of])}."]
 
 
 def _failure_lines(failures: dict[int, str]) -> list[str]:

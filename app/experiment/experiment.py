@@ -105,6 +105,8 @@ class Experiment:
         if hidden.shape != shape:
             found, expected = (f"{columns} x {rows}" for rows, columns in (hidden.shape, shape))
             raise InputError(file, "key photographs.mask", f"is {found} pixels, the photographs are {expected}")
+        if hidden.all():
+            raise InputError(file, "key photographs.mask", "hides every pixel: those that are not zero are not used")
         return replace(used, hidden=hidden)
 
     def fringe_photographs(self) -> Photographs | None:
@@ -329,6 +331,13 @@ def read_grain_guess(experiment: Experiment) -> GrainGuess | None:
     from .coincident_rods import refuse_coincident_rods  # SciPy is loaded late: a photograph is read before
 
     refuse_coincident_rods(table.file, ids, radius, np.column_stack([guess.x, guess.y])[None])
+    height, width = experiment.photographs().shape
+    outside = (guess.x < -0.5) | (guess.y < -0.5) | (guess.x > width - 0.5) | (guess.y > height - 0.5)
+    for row in np.flatnonzero(outside)[:1].tolist():
+        place = f"({guess.x[row]:g}, {guess.y[row]:g}) px"
+        raise InputError(
+            table.file, f"grain {ids[row]}", f"lies at {place}, outside of the photograph of {width} x {height} pixels"
+        )
     return guess
 
 

@@ -59,6 +59,8 @@ class Photographs(Sequence[Image]):
             if error.errno != errno.ENAMETOOLONG:
                 raise
             raise InputError(place, f"photographs.files = {pattern[:60]!r} …", "is too long for a name") from None
+        for broken in sorted(file for file in found if file.is_symlink() and not file.exists()):
+            raise InputError(broken, "", "is a link to a file that does not exist")
         files = [file for file in found if file.is_file()]
         if not files:
             raise InputError(place, f"photographs.files = {pattern!r}", "no file matches")

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, KDTree
@@ -34,10 +38,36 @@ SOLID_FRACTION, RIM_POINTS, FEWEST_ENCLOSING = 0.8, 12, 5  # of a dense packing;
 MAX_DISTANCE = 1.0  # widths of the packing between it and a wall, at most
 
 
+@dataclass(frozen=True, slots=True)
+class PackingSources:
+    """Where the parts of a packing are given: files and keys of an experiment, or arguments in Python."""
+
+    radii: tuple[Path | str, str]  # file or argument, and the column or key in it
+    precision: tuple[Path | str, str] | None  # of given tracks; None: tracked from photographs
+    walls: Mapping[int, Path | str]  # by the side of a wall
+    pixel_size: float | None = None  # [m] of the photographs; None: none, or not yet known
+
+    @classmethod
+    def of(cls, experiment: Experiment) -> PackingSources:
+        """Return the files and keys of an experiment."""
+        config, folder, file = experiment.config, experiment.folder, experiment.file
+        radii = file, "key photographs.pixel_size or photographs.radii"
+        precision, walls = None, {}
+        if config.tracks is not None:
+            radii = folder / config.tracks.grains, "column radius"
+            precision = file, f"key tracks.precision = {config.tracks.precision:g}"
+        if config.walls is not None:
+            straight, round_ = (config.walls.file or config.walls.corners, config.walls.arcs or config.walls.corners)
+            walls = {STRAIGHT: folder / (straight or ""), IN: folder / (round_ or ""), OUT: folder / (round_ or "")}
+        pixel = None if config.photographs is None else config.photographs.pixel_size
+        return cls(radii, precision, walls, pixel if isinstance(pixel, float) else None)
+
+
 def check_packing(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> list[str]:
     """Return warnings about rods, walls and loads. Raises InputError where they cannot be right."""
-    check_inside(experiment, tracks, walls)
-    check_radii(experiment, tracks)
+    sources = PackingSources.of(experiment)
+    check_inside(sources, tracks, walls)
+    check_radii(sources, tracks)
     sides = open_sides(walls) if walls.cell is None and tracks.boundary is None else []
     return [
         *rods_beyond_ends(tracks, walls),
@@ -48,21 +78,19 @@ def check_packing(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> 
     ]
 
 
-def check_radii(experiment: Experiment, tracks: Tracks) -> None:
+def check_radii(sources: PackingSources, tracks: Tracks) -> None:
     """Raise InputError where nearest neighbours are not about the sum of two radii apart, since packed rods touch.
 
     Typical causes are diameters given as radii, a wrong unit or a wrong scale.
     """
-    section = experiment.config.tracks
-    file = experiment.file if section is None else experiment.folder / section.grains
-    key = "key photographs.pixel_size or photographs.radii" if section is None else "column radius"
+    file, key = sources.radii
     middle = float(np.median(tracks.radius))
     if middle > GREATEST_RADIUS:
         guess = "; they look like millimetres" if middle < 1e3 * GREATEST_RADIUS else ""
         raise InputError(file, key, f"makes the median radius {middle:g} m: lengths are in metres{guess}")
-    if section is not None and section.precision > middle:
+    if sources.precision is not None and np.nanmin(tracks.sigma) > middle:
         raise InputError(
-            experiment.file, f"key tracks.precision = {section.precision:g}",
+            *sources.precision,
             f"is more than the rods' radius, {middle:g} m: it is the standard deviation of a position, in metres",
         )  # fmt: skip
     here, largest = tracks.position[0][tracks.present[0]], int(np.argmax(tracks.radius))
@@ -233,10 +261,9 @@ def neighbour_spacing(position: Array, radius: Array) -> Array:
     return (distance[:, 1:] / (radius[:, None] + radius[other[:, 1:]])).min(axis=1)
 
 
-def check_inside(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> None:
+def check_inside(sources: PackingSources, tracks: Tracks, walls: WallTracks) -> None:
     """Raise InputError where a centre lies beyond a wall by more than its radius: a wrong unit, origin or direction."""
-    section = experiment.config.walls
-    if section is None:
+    if walls.count == 0:
         return
     found: dict[int, tuple[int, int, float]] = {}  # of every wall the first frame and row, and how far beyond [m]
     for k in range(tracks.frame_count):  # one by one: the distances from all walls in all frames take much memory
@@ -247,21 +274,18 @@ def check_inside(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> N
         return
     w = min(found)
     k, row, far = found[w]
-    table = (section.file if walls.sides[w] == STRAIGHT else section.arcs) or section.corners
     raise InputError(
-        experiment.folder / (table or ""),
+        sources.walls[int(walls.sides[w])],
         f"frame {k}, wall {walls.name[w]!r}",
         f"grain {tracks.id[row]} lies {far * 1e3:.4g} mm beyond it; "
         f"the packing must lie {SIDE_OF_PACKING[int(walls.sides[w])]}, all in metres"
-        f"{_cause_of_walls(experiment, tracks, walls)}",
+        f"{_cause_of_walls(sources.pixel_size, tracks, walls)}",
     )
 
 
-def _cause_of_walls(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> str:
+def _cause_of_walls(pixel: float | None, tracks: Tracks, walls: WallTracks) -> str:
     """Return the mistake whose correction puts the grains of frame 0 between the walls; empty where they are."""
     ends, side = walls.endpoints[0], walls.sides
-    photographs = experiment.config.photographs
-    pixel = photographs.pixel_size if photographs is not None else None
     place = tracks.position[0][tracks.present[0]]
     guesses = [
         ("walls look reversed", ends[:, ::-1], -side),
@@ -269,7 +293,7 @@ def _cause_of_walls(experiment: Experiment, tracks: Tracks, walls: WallTracks) -
         ("walls look y-down", _upside_down(ends, place)[:, ::-1], side),
         ("walls look like millimetres", 1e-3 * ends, side),
     ]
-    if isinstance(pixel, float):
+    if pixel is not None:
         guesses.append(("walls look like pixels", pixel * ends, side))
         guesses.append(("walls look like pixels", _upside_down(pixel * ends, place), side))
     radius = tracks.radius[tracks.present[0]]

@@ -21,6 +21,7 @@ from ..solver.assessment.intervals.scale_sd import FIRST_BY_SECOND
 from ..solver.assessment.intervals.statistic_intervals import widen_for_friction
 from ..solver.assessment.intervals.wall_sensors import scale_error
 from ..solver.assessment.penalties import limit_by_intervals, limit_for_few_photographs, penalise_friction
+from ..solver.bodies.motion import Snapshot
 from ..solver.convex.friction_check import FrictionCheck
 from ..solver.frame_forces import FrameForces, FrameStatus
 from ..solver.kinematics.sequence_kinematics import SequenceKinematics, measure_kinematics
@@ -138,7 +139,7 @@ def _with_first_frame(
             return frames, statistics
         posterior, reason = found
         forces, _ = solve_first_frame(
-            sequence.packing, sequence.snapshots, sequence.settings, posterior, reason,
+            sequence.packing, _at_rest(sequence.snapshots), sequence.settings, posterior, reason,
             verdicts=sequence.verdicts, failed=sequence.failed,
         )  # fmt: skip
         fringed = sequence.tracks.fringes is not None  # they determine the scale of every frame by themselves
@@ -155,6 +156,14 @@ def _with_first_frame(
         LazySequence(len(frames), lambda k: forces if k == 0 else frames[k]),
         LazySequence(len(frames), lambda k: summary if k == 0 else statistics[k]),
     )
+
+
+def _at_rest(snapshots: Sequence[Snapshot]) -> Sequence[Snapshot]:
+    """A single photograph as two of the same packing at rest, so that its positions count; others as they are."""
+    if len(snapshots) != 1:
+        return snapshots
+    only = snapshots[0]
+    return only, replace(only, time=only.time + 1.0)
 
 
 def _on_scale_of(former: FrameForces, forces: FrameForces) -> FrameForces:

@@ -43,8 +43,8 @@ def as_mapping(name: str, value: object, content: str) -> Mapping[Any, Any]:
 
 
 def is_number(value: object) -> bool:
-    """Whether a value is a finite number."""
-    return isinstance(value, Real) and math.isfinite(value)
+    """Whether a value is a finite number, and no truth value."""
+    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def as_whole(name: str, value: object) -> int:

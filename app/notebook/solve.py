@@ -12,7 +12,7 @@ import pandas as pd
 from ..compilation.ahead import SOLVER_KERNELS, KernelsAhead
 from ..experiment.boundary import boundary_of, check_cell, find_boundary
 from ..experiment.config.experiment_file import as_toml, load_sections
-from ..experiment.config.input_sections import OUTER
+from ..experiment.config.input_sections import OUTER, PRESSURES
 from ..experiment.config.unused_keys import refuse_unused_keys
 from ..experiment.experiment import (
     CELL_COLUMNS,
@@ -23,6 +23,7 @@ from ..experiment.experiment import (
     arrange_cell,
     arrange_tracks,
 )
+from ..experiment.plausibility import PackingSources, check_inside, check_radii
 from ..experiment.walls import ARC_COLUMNS, LOAD_COLUMNS, WALL_COLUMNS, arrange_arcs, arrange_loads, arrange_walls
 from ..inference.infer_sequence import infer_sequence
 from ..inference.inference_settings import material_of, settings_of
@@ -31,11 +32,13 @@ from ..inference.solve_frames import InferenceObserver
 from ..process.errors import InputError, UndeterminedError
 from ..process.progress import Progress
 from ..solver.bodies.cell import unwrap
-from ..solver.bodies.wall_shapes import STRAIGHT
+from ..solver.bodies.wall_shapes import IN, OUT, STRAIGHT
 from ..tracks import Tracks, WallTracks
 from .arguments import as_frame, as_mapping, as_strings, as_table, is_number
 from .run import Run
 from .shown_progress import shown_progress
+
+WALL_ARGUMENTS = {STRAIGHT: "walls", IN: "arcs", OUT: "arcs"}  # by the side of a wall
 
 Columns = pd.DataFrame | Mapping[str, Any]  # of equal length, by name
 
@@ -110,6 +113,9 @@ def solve(
     tracked = _arrange_tracks(as_frame("tracks", tracks), precision)
     wall_tracks = _arrange_walls(walls, arcs, load, tracked.frame_count, {} if pressure is None else pressure)
     tracked, wall_tracks = _add_boundary(tracked, wall_tracks, boundary)
+    sources = PackingSources(("tracks", "column radius"), ("precision", f"{precision:g}"), WALL_ARGUMENTS)
+    check_inside(sources, tracked, wall_tracks)
+    check_radii(sources, tracked)
     inputs = Inputs(tracked, wall_tracks, material_of(sections), settings_of(sections))
     shown, kernels = progress or shown_progress(), KernelsAhead()
     try:
@@ -186,8 +192,9 @@ def _arrange_walls(
     for name, value in as_mapping("pressure", pressure, 'walls to pascals, such as {"top": 50e3}').items():
         if name not in names:
             raise InputError("pressure", repr(name), f"is not the name of a wall: there are {', '.join(names)}")
-        if not (is_number(value) and value > 0):
-            raise InputError("pressure", f"{name} = {value!r}", "is not a positive number of pascals")
+        if not (is_number(value) and PRESSURES[0] <= value <= PRESSURES[1]):
+            limits = "{:g} to {:g}".format(*PRESSURES)
+            raise InputError("pressure", f"{name} = {value!r}", f"is not a number of pascals from {limits}")
     pressed = np.array([pressure.get(name, np.nan) for name in names], np.float64)
     measured = None
     if load is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
@@ -9,7 +10,7 @@ from rich.console import Console
 from ..experiment.reading.tables import Table
 from ..verdicts.reviewer_name import account_name
 from ..verdicts.table import export_verdicts, import_verdicts
-from .judging.candidate_pairs import find_candidate_pairs
+from .judging.candidate_pairs import find_candidate_pairs, gap_in_radii
 from .reviewed_pairs import store_forces
 from .reviewed_run import open_reviewed_run
 
@@ -42,8 +43,8 @@ def import_verdicts_of_run(path: Path, file: Path | Table, *, reviewer: str | No
     found = [find_candidate_pairs(run.results, k, run.threshold) for k in range(len(run.results.frames))]
     pairs = {each.frame: list(zip(each.contacts.i.tolist(), each.contacts.j.tolist(), strict=True)) for each in found}
     entries = import_verdicts(
-        run.log, file, run.bodies, reviewer or _default_reviewer(file), first_frame=run.first_frame,
-        frame_count=len(run.results.frames), candidates=pairs if complete else None,
+        run.log, file, run.bodies, reviewer or _default_reviewer(file), frames=run.photographs(),
+        candidates=pairs if complete else None, gap=partial(gap_in_radii, run.results),
     )  # fmt: skip
     store_forces(run, entries)
     return len(entries)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
 from ..experiment.reading.input_files import regular
@@ -11,6 +11,7 @@ from ..experiment.reading.tables import Table, read_table, write_table
 from .decisions import BodyNames
 from .log import Entry, Origin, Pair, Verdict, VerdictLog, canonical
 
+MAX_GAP = 0.5  # radii between the surfaces of a contact, at most: more is a wrong id, and no error of tracking
 _OPTIONAL = ("verdict", "reviewer", "time", "seconds")
 
 
@@ -34,9 +35,9 @@ def import_verdicts(
     bodies: BodyNames,
     reviewer: str,
     *,
-    first_frame: int,
-    frame_count: int,
+    frames: range,
     candidates: Mapping[int, Collection[tuple[int, int]]] | None = None,
+    gap: Callable[[int, int, int], float] | None = None,
 ) -> list[Entry]:
     """Append the verdicts of a table to the log; return the written entries.
 
@@ -51,16 +52,19 @@ def import_verdicts(
         Names and rows of the run's bodies.
     reviewer
         Name of the reviewer for rows without one.
-    first_frame, frame_count
-        First frame of the run in the experiment, and number of its frames.
+    frames
+        Frames of the experiment that the run covers.
     candidates
         Pairs of rows by frame of the run. If given, the table lists all contacts of its frames, so that every candidate
         without a row is no contact.
+    gap
+        Returns the gap between two rows of bodies in a frame of the run over the mean radius of both, NaN where a
+        body is not seen. If given, a contact between bodies that are far apart is refused.
 
     Raises
     ------
     InputError
-        A frame, grain, wall or verdict is unknown; nothing is written.
+        A frame, grain, wall or verdict is unknown, or a contact cannot be one; nothing is written.
     """
     present = [name for name in _OPTIONAL if name in (file.names if isinstance(file, Table) else _header(file))]
     table = file if isinstance(file, Table) else read_table(file, ("frame", "i", "j", *present))
@@ -77,13 +81,15 @@ def import_verdicts(
                 raise table.error(row, column, "is not the id of a grain")
         if a == b:
             raise table.error(row, "j", "is the grain itself")
-        if not first_frame <= number < first_frame + frame_count:
-            last = first_frame + frame_count - 1
-            raise table.error(row, "frame", f"is not a frame of the results ({first_frame} to {last})")
+        if number not in frames:
+            raise table.error(row, "frame", f"is not a frame of the results ({frames[0]} to {frames[-1]})")
         given = table.text("verdict")[row] if "verdict" in present else Verdict.CONTACT.value
         verdict = given.strip().lower().replace("_", " ")
         if verdict not in {each.value for each in Verdict}:
             raise table.error(row, "verdict", "is none of contact, no contact, unsure")
+        apart = gap(number - frames[0], rows[a], rows[b]) if gap is not None and verdict == Verdict.CONTACT else 0.0
+        if apart > MAX_GAP:
+            raise table.error(row, "j", f"is no contact of {a}: their surfaces are {apart:.2g} radii apart")
         pair = canonical((number, a, b))
         listed.add(pair)
         name = table.text("reviewer")[row] if "reviewer" in present else ""
@@ -96,7 +102,7 @@ def import_verdicts(
         )  # fmt: skip
     for number in sorted(set(frame.tolist())) if candidates is not None else ():
         assert candidates is not None
-        for low, high in candidates.get(number - first_frame, ()):
+        for low, high in candidates.get(number - frames[0], ()):
             a = bodies.name(low)
             assert isinstance(a, int)
             if canonical((number, a, bodies.name(high))) not in listed:

@@ -19,6 +19,7 @@ from .trust import Assessment, interior_limit, motion_assessment, unseen_penalty
 COARSE_STEP = math.radians(0.25)  # [rad] shear of a step beyond which forces cannot be followed
 SOFT_CHAIN_LOSS = 0.15  # where a single chain treats soft grains as hard
 BEYOND_WALL_LOSS = 12.0  # for each grain beyond a wall, per grain
+STEP_SHOWN_BY = ("previous_residual", "force_change")  # evidence that too large a step explains
 FEW_PHOTOGRAPHS, TRUST_OF_FEW = 3, 0.28  # of a test, below which the trust is at most the second
 LEFT_BY_INTERVALS = 2.5, 0.4  # of `most_by_intervals`
 LITTLE_KNOWN = frozenset({"undetermined", "noise", "few_interior"})  # measures that contradict nothing
@@ -157,8 +158,9 @@ def describe_few_photographs(count: int) -> str:
     """State that a test of so many photographs has too few of them; empty: it has enough."""
     if count >= FEW_PHOTOGRAPHS:
         return ""
-    photographs = "1 photograph" if count == 1 else f"{count} photographs"
-    return f"the test has only {photographs}: one motion alone is not confirmed by another; take more"
+    if count == 1:
+        return "the test has only 1 photograph: no motion confirms the forces; take more"
+    return f"the test has only {count} photographs: one motion alone is not confirmed by another; take more"
 
 
 def describe_few_grains(evidence: Evidence) -> str:
@@ -176,11 +178,14 @@ def _contradictions(evidence: Evidence) -> list[Penalty]:
     if math.isnan(evidence.disagreement) or not evidence.assessed:
         return []
     found = evidence.information
-    step = math.degrees(evidence.shear)
-    coarse = (
-        f": photographs are {step:.2g}° of shear apart, take them every .25°" if evidence.shear > COARSE_STEP else ""
+    moved = (
+        f"rods moved as by {math.degrees(evidence.shear):.2g}° of shear since the photograph before: take photographs "
+        "more often, every .25°"
     )
     lost = losses(evidence)
+    coarse = dict.fromkeys(STEP_SHOWN_BY, "")  # the step is named once, where it costs most
+    if evidence.shear > COARSE_STEP and not lost.get("coarse_step", 0.0) >= REPORTED:
+        coarse[max(STEP_SHOWN_BY, key=lambda name: lost.get(name, 0.0))] = f": {moved}"
     noisy = lost.get("noise", 0.0) > REPORTED
     hidden = f"a noise of {1e6 * found.noise:.3g} µm hides the overlaps" if noisy else ""
     words = {
@@ -192,7 +197,7 @@ def _contradictions(evidence: Evidence) -> list[Penalty]:
         "correction": f"the forces correct the measured motion by ε = {evidence.correction:.2g}: tracks, friction, a "
         "missing contact",
         "previous_residual": f"the previous forces leave a residual of ū = {evidence.old_unbalance:.2g}: the packing "
-        f"rearranges, or walls and photographs do not belong together{coarse}",
+        f"rearranges, or walls and photographs do not belong together{coarse['previous_residual']}",
         "disagreement_of_members": f"the methods disagree by {100.0 * evidence.disagreement:.0f} % of the forces: "
         f"noise of {1e6 * found.noise:.3g} µm against {1e6 * found.motion:.3g} µm that neighbours move in a step",
         "gap_error": f"gaps of strong contacts deviate by {1e6 * found.gap_error:.3g} µm beyond noise: radii or "
@@ -212,14 +217,14 @@ def _contradictions(evidence: Evidence) -> list[Penalty]:
         "forces: contacts, walls or friction are not as stated",
         "inertial_number": f"the inertial number is {evidence.inertial_number:.2g}: part of the forces accelerates "
         "grains; load more slowly, or photograph at rest",
-        "coarse_step": f"photographs are {step:.2g}° of shear apart: take them every .25°",
+        "coarse_step": moved,
         "undetermined": f"no load is known, and balance leaves {100.0 * found.undetermined:.0f} % of the components of "
         "forces open: photograph the walls, and state the load on one",
         "noise": f"a noise of {1e6 * found.noise:.3g} µm hides overlaps, and no load is known: state one, or measure "
         "positions more exactly",
         "few_interior": f"no load is known, and only {evidence.interior:g} grains have neighbours all around: "
         "photograph a larger part of the packing, or its walls",
-        "force_change": f"{100.0 * evidence.force_change:.0f} % of the force pattern is new{coarse}",
+        "force_change": f"{100.0 * evidence.force_change:.0f} % of the force pattern is new{coarse['force_change']}",
     }
     little = LITTLE_KNOWN | BY_NOISE if noisy else LITTLE_KNOWN
     return [Penalty(loss, words[name], counted=True, little_known=name in little) for name, loss in lost.items()]

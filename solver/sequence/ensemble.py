@@ -75,6 +75,8 @@ class EnsembleState:
 
 AGREEING_FRAMES = 3  # with H below its level: it only falls until the forces are reset
 CHAINS = 2  # of the MEMBERS, the first
+# Mean force of a chain over the force scale, below which the program could not distinguish its sum from zero.
+LEAST_CHAIN = 0.02
 # Free grains up to which the sweeps of the settings carry a load through a packing that had no forces. A load spreads
 # from row to row like heat: the sweeps that it takes grow with the square of the rows, the number of grains.
 REACHED_GRAINS = 1200
@@ -284,13 +286,16 @@ def _compare_chains(contacts: Contacts, steps: list[ChainStep], state: EnsembleS
 def assemble_frame_balance(problem: FrameProblem, contacts: Contacts, fn: Array | None = None) -> Balance:
     """Balance of the frame on these contacts (c); fn (c,): of the first chain, needed where no load sets the scale."""
     packing, walls, wall_total = problem.packing, problem.walls, None
+    unit = force_scale(packing, problem.settings.chain)
     if not packing.scale_is_known:  # without load and weight forces are known up to a scale: that of the first chain
         assert fn is not None
-        wall_total = float(fn[contacts.gauge].sum())
+        wall_total, count = float(fn[contacts.gauge].sum()), int(contacts.gauge.sum())
+        if wall_total < LEAST_CHAIN * unit * count:  # at rest it bears nothing, and no program is as exact as that
+            wall_total = unit * count
     return assemble_balance(
         contacts, packing.grains, walls, present=problem.snapshot.present,
         friction=packing.material.friction_at(contacts.with_wall),
-        scale=LoadScale(force_scale(packing, problem.settings.chain), packing.material.gravity, wall_total),
+        scale=LoadScale(unit, packing.material.gravity, wall_total),
     )  # fmt: skip
 
 

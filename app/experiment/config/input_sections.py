@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, model_validator
 from .section import Finite, Length, Pixels, Section, Switch, above, between, key, whole
 
 OUTER = "outer"  # instead of a table: the outermost grains
+PRESSURES = (1e-3, 1e11)  # [Pa] of a wall, at least and at most
 
 
 def _pixel_size(value: Any) -> Any:
@@ -199,7 +200,7 @@ class GivenTracks(Section):
 class Plate(Section):
     """Load and end points of one wall."""
 
-    pressure: Annotated[float, between(1e-3, 1e11)] | None = key(
+    pressure: Annotated[float, between(*PRESSURES)] | None = key(
         "Pressure that loads this wall between its neighbours, where rods can touch it; absent: its measured velocity "
         "is imposed. One loaded wall sets the scale of all forces.",
         unit="Pa",

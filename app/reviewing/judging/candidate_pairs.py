@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,7 @@ from ...results.results import Results
 from ...solver.bodies.grains import Array
 from ...solver.bodies.walls import Walls
 from ...solver.contacts.contacts import Contacts, ContactSource, detect_contacts, measure_pairs
-from ...solver.contacts.pairs import are_among, are_present, join_keys, match_values
+from ...solver.contacts.pairs import are_among, are_present, join_keys, make_key, match_values
 from ...solver.contacts.verdicts import DETECTED
 from ...solver.sequence.settings import SequenceSettings
 
@@ -81,6 +82,18 @@ def walls_at(results: Results, frame: int) -> Walls:
     """The walls of one frame, at rest."""
     cell = None if results.walls.cell is None else results.walls.cell[frame]
     return Walls.at_rest(results.walls.endpoints[frame], side=results.walls.side, cell=cell)
+
+
+def gap_in_radii(results: Results, frame: int, i: int, j: int) -> float:
+    """Gap between two bodies, given by their rows, over the mean radius of the grains of both; NaN: one is not seen."""
+    tracks, n = results.tracks, results.grains.count
+    i, j = min(i, j), max(i, j)
+    grains = [row for row in (i, j) if row < n]
+    if not tracks.present_in(frame)[grains].all():
+        return math.nan
+    key = np.array([make_key(i, j, n + results.walls.count)])
+    measured = measure_pairs(results.grains, tracks.position[frame], walls_at(results, frame), key)
+    return float(measured.gap[0] / results.grains.radius[grains].mean())
 
 
 def gap_standard_deviation(contacts: Contacts, position_sd: float) -> Array:

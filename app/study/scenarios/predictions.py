@@ -18,6 +18,7 @@ from ...inference.diagnosis.data_quality import REFERENCE_STEP
 from ...prediction import NO_EXPECTATION, Prediction, predict_accuracy
 from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
+from ...solver.dem.dem_truth import UnbalancedError
 from ...solver.statistics.agreement import pearson
 from ...synthetic.scenarios.preset_names import ScenarioName
 from ...synthetic.scenarios.scenario_table import SCENARIOS
@@ -163,11 +164,11 @@ def print_predictions(console: Console, outcomes: Sequence[PredictionOutcome]) -
 
 def _predict(plan: StudyPlan, scenario: ScenarioName, seed: int) -> Prediction | None:
     with TemporaryDirectory() as folder:
-        made = make_planned(plan, Path(folder), scenario, seed)
-        experiment = load_experiment(made.folder, plan.settings)
         try:
+            made = make_planned(plan, Path(folder), scenario, seed)
+            experiment = load_experiment(made.folder, plan.settings)
             tracks, walls = read_scenario(experiment)
-        except InputError:
+        except (InputError, UnbalancedError):  # the score states which
             return None
     return predict_accuracy(experiment.config, tracks, walls)
 

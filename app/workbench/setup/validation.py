@@ -19,6 +19,7 @@ from ...experiment.experiment import Experiment, GrainGuess, read_grain_guess, r
 from ...experiment.pictures.image import Channel
 from ...experiment.pictures.picture_file import read_photograph
 from ...experiment.plausibility import (
+    PackingSources,
     check_inside,
     check_radii,
     expected_rods,
@@ -265,7 +266,7 @@ def _validate_rods(found: ValidationResult, experiment: Experiment) -> None:
     _validate_scale(found)
     tracks = first_tracks(found)
     try:
-        check_radii(experiment, tracks)
+        check_radii(PackingSources.of(experiment), tracks)
     except InputError as error:
         found.steps["rods"].add_warning(_without_file(experiment.file, error))
     _warn_of_small(found)
@@ -312,7 +313,7 @@ def _validate_walls(found: ValidationResult, experiment: Experiment) -> None:
             "apparatus? Step Rods drops them with one click."
         )
     try:
-        check_inside(experiment, tracks, first)
+        check_inside(PackingSources.of(experiment), tracks, first)
     except InputError as error:
         step.add_error(_without_file(experiment.folder, error))
         return
@@ -355,10 +356,10 @@ def _validate_tracks(found: ValidationResult, experiment: Experiment) -> None:
     if tracks is None:
         return
     try:
-        check_radii(experiment, tracks)
+        check_radii(PackingSources.of(experiment), tracks)
         found.walls = read_walls(experiment, tracks.frame_count)
         if found.walls is not None:
-            check_inside(experiment, tracks, found.walls)
+            check_inside(PackingSources.of(experiment), tracks, found.walls)
     except InputError as error:
         found.steps["walls"].add_error(_without_file(experiment.folder, error))
 

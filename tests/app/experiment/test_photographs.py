@@ -10,7 +10,7 @@ from types import ModuleType, SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from rodsight.experiment.experiment import load_experiment, read_times
+from rodsight.experiment.experiment import load_experiment, read_grain_guess, read_times
 from rodsight.experiment.photographs import Photographs, PrefetchedPhotographs
 from rodsight.experiment.pictures.image import ImageSelection
 from rodsight.experiment.pictures.picture_file import read_photograph
@@ -340,6 +340,27 @@ def test_a_mask_can_be_a_picture(tmp_path):
     write(tmp_path, "mask.png", mask[:-1])
     with pytest.raises(InputError, match="mask: is 60 x 39 pixels, the photographs are 60 x 40"):
         load_experiment(tmp_path).photographs()
+    write(tmp_path, "mask.png", np.full_like(mask, 255))
+    with pytest.raises(InputError, match="mask: hides every pixel"):
+        load_experiment(tmp_path).photographs()
+
+
+def test_a_link_to_a_missing_photograph_is_named(tmp_path):
+    write(tmp_path, "0000.png", np.full((40, 60), 50, np.uint8))
+    (tmp_path / "0001.png").symlink_to(tmp_path / "unmounted" / "0001.png")
+    with pytest.raises(InputError, match=r"0001\.png: is a link to a file that does not exist"):
+        Photographs.matching(tmp_path, "*.png")
+
+
+@pytest.mark.parametrize("place", ["5000,20", "-200,20", "20,40"])
+def test_a_grain_outside_of_the_photograph_is_named(tmp_path, place):
+    write(tmp_path, "a.png", np.full((40, 60), 50, np.uint8))
+    (tmp_path / "experiment.toml").write_text(
+        'name = "x"\n[photographs]\nfiles = "a.png"\npixel_size = 1e-4\ninterval = 1.0\ngrains = "grains.csv"\n'
+    )
+    (tmp_path / "grains.csv").write_text(f"id,x,y,radius\n0,10,10,8\n999,{place},8\n")
+    with pytest.raises(InputError, match=r"grain 999: lies at .* outside of the photograph of 60 x 40 pixels"):
+        read_grain_guess(load_experiment(tmp_path))
 
 
 def test_an_interval_with_times_that_no_time_line_holds_is_refused(tmp_path):

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from rodsight.experiment.plausibility import (
+    PackingSources,
     check_inside,
     expected_rods,
     neighbour_spacing,
@@ -15,9 +15,11 @@ from rodsight.experiment.plausibility import (
     rods_cut_by_walls,
 )
 from rodsight.process.errors import InputError
+from rodsight.solver.bodies.wall_shapes import STRAIGHT
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
 RADIUS = 0.01  # [m]
+SOURCES = PackingSources(("tracks.csv", "column radius"), None, {STRAIGHT: Path("box/walls.csv")})
 
 
 def row_of_rods(count: int) -> Tracks:
@@ -72,19 +74,15 @@ def test_walls_through_rods_are_named() -> None:
 def test_rods_in_the_other_half_of_a_split_box_are_not_beyond_its_side() -> None:
     halves = np.array([[[[0.2, 0.0], [0.2, 0.1]], [[0.23, 0.1], [0.23, 0.2]]]])
     walls = WallTracks(("low", "high"), halves, np.full(2, np.nan))
-    table = SimpleNamespace(file="walls.csv", arcs=None, corners=None)
-    experiment = SimpleNamespace(config=SimpleNamespace(walls=table, photographs=None), folder=Path("box"))
-    check_inside(experiment, tracks_at(np.array([[0.19, 0.05], [0.22, 0.15]])), walls)
+    check_inside(SOURCES, tracks_at(np.array([[0.19, 0.05], [0.22, 0.15]])), walls)
     with pytest.raises(InputError, match="wall 'low': grain 1 lies 20 mm beyond it"):
-        check_inside(experiment, tracks_at(np.array([[0.19, 0.05], [0.22, 0.05]])), walls)
+        check_inside(SOURCES, tracks_at(np.array([[0.19, 0.05], [0.22, 0.05]])), walls)
 
 
 def test_one_wrong_place_of_a_later_photograph_is_not_blamed_on_the_walls() -> None:
     corners = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]])
     ends = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)  # the same upside down
     walls = WallTracks(tuple("brtl"), np.repeat(ends[None], 2, axis=0), np.full(4, np.nan))
-    table = SimpleNamespace(file="walls.csv", arcs=None, corners=None)
-    experiment = SimpleNamespace(config=SimpleNamespace(walls=table, photographs=None), folder=Path("box"))
     first = tracks_at(np.array([[0.02, 0.02], [0.05, 0.08], [0.08, 0.03]]))
     place = np.concatenate([first.position, first.position])
     place[1, 1, 0] = 5.0
@@ -92,5 +90,5 @@ def test_one_wrong_place_of_a_later_photograph_is_not_blamed_on_the_walls() -> N
     blank = np.full(given.shape, np.nan)
     tracks = Tracks(first.id, first.radius, np.arange(2.0), place, blank, blank, blank, given)
     with pytest.raises(InputError, match="beyond it") as refused:
-        check_inside(experiment, tracks, walls)
+        check_inside(SOURCES, tracks, walls)
     assert "look" not in str(refused.value)

@@ -22,13 +22,17 @@ from rodsight.results.results import Results
 from rodsight.robustness.design import Case
 from rodsight.robustness.factors import FIRST_COMPARED
 from rodsight.robustness.study import Nominal, measure_case
+from rodsight.solver.assessment.penalties import TRUST_OF_FEW
 from rodsight.solver.bodies.wall_shapes import OUT
 from rodsight.solver.contacts.contacts import ContactSource
+from rodsight.solver.contacts.pairs import align
 from rodsight.solver.frame_forces import FrameForces, FrameStatus
+from rodsight.solver.statistics.agreement import pearson
+from rodsight.study.scenarios.scenario_score import true_forces
 from rodsight.synthetic.scenarios.scenario_folder import make_scenario
 
 from tests.app.inference.diagnosis.test_smoothed_tracks import moving_average
-from tests.app.inference.scenarios import read_inputs
+from tests.app.inference.scenarios import SequenceKeeper, read_inputs
 
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
 
@@ -235,3 +239,17 @@ def test_sensors_that_contradict_the_scale_widen_it_and_change_no_force(contradi
     circles = replace(agreeing.walls, side=np.full(agreeing.walls.count, OUT, np.int8))
     assert np.isnan(replace(agreeing, walls=circles).wall_force_ratio()).all()
     assert np.isnan(replace(agreeing, walls=replace(agreeing.walls, force=None)).wall_force_ratio()).all()
+
+
+@pytest.mark.parametrize(("scenario", "least"), [("softer", 0.97), ("isotropic", 0.9)])
+def test_a_single_photograph_shows_forces_by_its_positions_and_is_not_trusted(tmp_path, scenario, least):
+    experiment = load_experiment(make_scenario(tmp_path, scenario, 6, grains=100).folder, ())
+    inputs = read_inputs(experiment)
+    inputs = replace(inputs, tracks=inputs.tracks.frames(0, 1), walls=inputs.walls.frames(0, 1))
+    kept = SequenceKeeper()
+    (frame,) = infer_sequence(inputs, kept).frames
+    key, force = true_forces(experiment, kept.sequence)[0]
+    _, found, true = align(frame.contacts.key, frame.fn, key, force[:, 0])
+    assert pearson(found, true) > least
+    assert frame.trust <= TRUST_OF_FEW
+    assert frame.trust_penalties.startswith("the test has only 1 photograph")

@@ -34,7 +34,7 @@ def walls(made_tracks: Path) -> pd.DataFrame:
 
 
 def solve(poses, walls, **choices):  # type: ignore[no-untyped-def]
-    pressure = {"top": 50e3}
+    pressure = choices.pop("pressure", {"top": 50e3})
     return rodsight.solve(poses, walls, pressure=pressure, settings=FEW | choices.pop("settings", {}), **choices)
 
 
@@ -128,6 +128,11 @@ def test_settings_and_material_of_a_call_are_used(run, poses, walls):
         (lambda p, w: (p, w, {"settings": {"contacts.threshold": 1e-4}}), "has no effect on the ensemble"),
         (lambda p, w: (p, w, {"precision": -1.0}), "precision: -1.0: is not a positive number"),
         (lambda p, w: (p.iloc[:0], w, {}), "tracks: has no rows"),
+        (lambda p, w: (p.assign(radius=1e3 * p["radius"]), w, {}), "column radius: .*they look like millimetres"),
+        (lambda p, w: (p, w.rename(columns={"x1": "x2", "x2": "x1", "y1": "y2", "y2": "y1"}), {}), "look reversed"),
+        (lambda p, w: (p.assign(x=p["x"] + 1.0), w, {}), "walls: frame 0, wall .*mm beyond it"),
+        (lambda p, w: (p, w, {"pressure": {"top": True}}), "top = True: is not a number of pascals"),
+        (lambda p, w: (p, w, {"pressure": {"top": 1e15}}), "is not a number of pascals from 0.001 to 1e"),
     ],
 )
 def test_invalid_input_is_named(poses, walls, change, message):

@@ -3,6 +3,7 @@
 import io
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
@@ -23,6 +24,8 @@ SOUND = Evidence(False, 0.05, 0.1, 0.01, 0.01, 1.0, 1e-3, 4e-3, 5, agreement=0.9
 WRONG = replace(
     SOUND, correction=2.0, old_unbalance=0.15, disagreement=0.5, agreement=0.1, overlap_agreement=0.1, unbalance=0.3
 )
+
+TRACKS = SimpleNamespace(frame_count=2)
 
 
 def predicted(evidence: Evidence | None) -> Prediction:
@@ -90,9 +93,11 @@ def test_photographs_that_show_everything_but_no_equilibrium_are_no_lack_of_phot
         monkeypatch.setattr(prediction, name, lambda *_: GOOD)
     monkeypatch.setattr(prediction, "solve_trial", lambda *_, **__: trial)
     monkeypatch.setattr(prediction, "diagnose", lambda *_: ())
-    assert prediction.predict_accuracy("config", "tracks", "walls").verdict() == prediction.NO_FORCES
+    assert prediction.predict_accuracy("config", TRACKS, "walls").verdict() == prediction.NO_FORCES
     monkeypatch.setattr(prediction, "measure_data_quality", lambda *_: None)
-    assert "two consecutive photographs" in prediction.predict_accuracy("config", "tracks", "walls").verdict()
+    assert "two consecutive photographs" in prediction.predict_accuracy("config", TRACKS, "walls").verdict()
+    one = prediction.predict_accuracy("config", SimpleNamespace(frame_count=1), "walls")
+    assert "one photograph shows no motion" in one.verdict()
 
 
 @pytest.mark.parametrize(("evidence", "compared"), [(SOUND, False), (WRONG, True)])
@@ -110,11 +115,11 @@ def test_rival_inputs_are_compared_where_the_first_twelve_photographs_leave_them
     monkeypatch.setattr(prediction, "solve_trial", solve)
     monkeypatch.setattr(prediction, "diagnose", lambda inputs, trial, progress: diagnosed.append(trial) or ())
     monkeypatch.setattr(prediction, "DOUBTFUL", 0.9)
-    found = prediction.predict_accuracy("config", "tracks", "walls")
+    found = prediction.predict_accuracy("config", TRACKS, "walls")
     assert found.trial == Trial((evidence,), 12)
     assert solved == ([12, 6] if compared else [12])
     assert diagnosed == ([Trial((evidence,), 6)] if compared else [None])
-    assert prediction.predict_accuracy("config", "tracks", None) == Prediction(GOOD, None)
+    assert prediction.predict_accuracy("config", TRACKS, None) == Prediction(GOOD, None)
     assert len(diagnosed) == 1
 
 

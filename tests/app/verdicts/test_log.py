@@ -171,7 +171,7 @@ def test_exported_verdicts_import_unchanged(log, tmp_path):
     log.append(contact(frame=0, a=7, b=2))
     assert export_verdicts(log, tmp_path / "out.csv") == 2
     again = VerdictLog(tmp_path / "again.jsonl")
-    assert len(import_verdicts(again, tmp_path / "out.csv", BODIES, "x", first_frame=0, frame_count=2)) == 2
+    assert len(import_verdicts(again, tmp_path / "out.csv", BODIES, "x", frames=range(2))) == 2
     before = {(e.subject, e.verdict, e.reviewer, e.seconds, e.time) for e in log.latest_entries()}
     assert {(e.subject, e.verdict, e.reviewer, e.seconds, e.time) for e in again.latest_entries()} == before
 
@@ -180,7 +180,7 @@ def test_a_complete_list_of_contacts_rejects_all_other_candidates(log, tmp_path)
     file = tmp_path / "list.csv"
     file.write_text("frame,i,j\n0,2,1\n0,3,top\n")
     pairs = {0: [(0, 1), (1, 2), (2, 4)], 1: [(0, 1)]}
-    assert len(import_verdicts(log, file, BODIES, "ben", first_frame=0, frame_count=2, candidates=pairs)) == 3
+    assert len(import_verdicts(log, file, BODIES, "ben", frames=range(2), candidates=pairs)) == 3
     verdicts = {entry.subject[1:]: entry.verdict for entry in log.latest_entries()}
     assert verdicts == {(1, 2): Verdict.CONTACT, (3, "top"): Verdict.CONTACT, (2, 3): Verdict.NO_CONTACT}
 
@@ -199,6 +199,21 @@ def test_a_wrong_row_is_named_and_nothing_is_written(log, tmp_path, row, named):
     file = tmp_path / "list.csv"
     file.write_text(f"frame,i,j\n0,2,1\n{row}\n")
     with pytest.raises(InputError, match="row 3") as raised:
-        import_verdicts(log, file, BODIES, "ben", first_frame=0, frame_count=2)
+        import_verdicts(log, file, BODIES, "ben", frames=range(2))
     assert named in str(raised.value)
     assert not log.file.exists()
+
+
+def test_a_contact_of_bodies_that_are_far_apart_is_refused(log, tmp_path):
+    file = tmp_path / "list.csv"
+    file.write_text("frame,i,j,verdict\n5,2,1,contact\n5,1,3,no contact\n5,1,12,contact\n")
+
+    def gap(frame: int, i: int, j: int) -> float:
+        assert frame == 0
+        return 0.1 if {i, j} == {0, 1} else 25.0
+
+    with pytest.raises(InputError, match=r"row 4.*12.*is no contact of 1: their surfaces are 25 radii apart"):
+        import_verdicts(log, file, BODIES, "ben", frames=range(5, 7), gap=gap)
+    assert not log.file.exists()
+    file.write_text("frame,i,j,verdict\n5,2,1,contact\n5,1,3,no contact\n")
+    assert len(import_verdicts(log, file, BODIES, "ben", frames=range(5, 7), gap=gap)) == 2

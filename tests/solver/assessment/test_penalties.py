@@ -68,8 +68,8 @@ def test_every_penalty_lowers_the_trust_and_states_cause_and_cure(evidence, word
 
 def test_a_wide_step_is_named_where_the_force_pattern_is_new():
     wide = replace(ASSESSED, shear=4 * COARSE_STEP, force_change=0.5, correction=0.4)
-    assert "1° of shear apart" in describe_penalties(wide)
-    assert "of shear apart" not in describe_penalties(replace(wide, shear=COARSE_STEP))
+    assert describe_penalties(wide).count("moved as by 1° of shear since the photograph before") == 1
+    assert "of shear since" not in describe_penalties(replace(wide, shear=COARSE_STEP))
 
 
 def test_penalties_beside_the_evidence_have_their_size():
@@ -161,7 +161,7 @@ def test_two_photographs_alone_are_not_trusted():
     assert limited.trust < 0.3
     assert limited.trust_penalties.startswith("the test has only 2 photographs")
     assert limited.expected_correlation == limited.trust
-    assert "only 1 photograph:" in limit_for_few_photographs(frame, 1).trust_penalties
+    assert "only 1 photograph: no motion" in limit_for_few_photographs(frame, 1).trust_penalties
     assert limit_for_few_photographs(frame, 3) is frame
     low = replace(frame, trust=0.1)
     assert limit_for_few_photographs(low, 2) is low
