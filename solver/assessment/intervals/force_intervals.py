@@ -63,6 +63,7 @@ _FITTED = FITTED["force_intervals"]
 # squares of the formula's σ/⟨f⟩, of FLOOR, of √(1 − P(bears)) f, and for the first frame of FIRST_SCALE f. Last axis:
 # f_n, f_t.
 FLOOR = np.array(_FITTED["floor"])
+MODEL_ERROR = np.array(_FITTED["model_error"])  # of f_n and f_t of hard grains, over ⟨f_n⟩, whatever the noise
 FIRST_SCALE: float = _FITTED["first_scale"]
 TYPICAL = np.array(_FITTED["typical"])
 MARGIN: float = _FITTED["margin"]
@@ -164,9 +165,15 @@ def calibrate_sd(frame: FrameForces) -> FrameForces:
     formula = np.column_stack([frame.fn_sd, frame.ft_sd]) / mean
     size = np.sqrt(formula**2 + FLOOR**2 + _errors_with_force(frame, mean) ** 2) / TYPICAL
     sd = mean * TYPICAL * interval_factors(frame) * size ** (1.0 + POWER[source_of_frame(frame)])
-    sd = np.hypot(sd, _scale_errors(frame))
+    sd = np.sqrt(sd**2 + _added_variance(frame, mean))
     sd[formula == 0] = 0.0
     return replace(frame, fn_sd=sd[:, 0], ft_sd=sd[:, 1])
+
+
+def _added_variance(frame: FrameForces, mean: float) -> Array:
+    """Variances (c, 2) [N²] that do not depend on what the members say: of the scale, and of the model."""
+    model = 0.0 if frame.soft else MODEL_ERROR * mean
+    return _scale_errors(frame) ** 2 + model**2
 
 
 def _errors_with_force(frame: FrameForces, mean: float) -> Array:
@@ -199,8 +206,8 @@ def widen_scale(frame: FrameForces, sd: float) -> FrameForces:
 def formula_sd_of(frame: FrameForces) -> Array:
     """Invert `calibrate_sd`: its argument over the mean f_n, floor and proportional errors included (c, 2)."""
     stated = np.column_stack([frame.fn_sd, frame.ft_sd])
-    alone = np.sqrt(np.maximum(stated**2 - _scale_errors(frame) ** 2, 0.0))
-    sd = alone / (mean_normal_force(frame.fn) * TYPICAL)
+    mean = mean_normal_force(frame.fn)
+    sd = np.sqrt(np.maximum(stated**2 - _added_variance(frame, mean), 0.0)) / (mean * TYPICAL)
     return TYPICAL * (sd / interval_factors(frame)) ** (1.0 / (1.0 + POWER[source_of_frame(frame)]))
 
 

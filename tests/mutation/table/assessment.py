@@ -26,6 +26,7 @@ MUTANTS = [
     *mutants_of(
         "solver/assessment/intervals/force_intervals.py",
         FORCE_INTERVALS,
+        ("_scale_errors(frame) ** 2 + model**2", "_scale_errors(frame) ** 2"),
         ("_scale_errors(wider) ** 2 - _scale_errors(frame) ** 2", "_scale_errors(wider) ** 2"),
         ("np.where(stated > 0.0, np.sqrt(stated**2 + variance), stated)", "np.sqrt(stated**2 + variance)"),
     ),
@@ -148,7 +149,8 @@ MUTANTS = [
         ("check.measured, 1.0 / COVERAGE_FACTOR)", "check.measured, 1.0)"),
         ("BEYOND_WALL_LOSS * beyond / max(evidence.grains, 1)", "BEYOND_WALL_LOSS * beyond / 100.0"),
         ("check.measured, 1.0 - frame.position_weight\n", "check.measured, 1.0\n"),
-        ("if evidence.shear > COARSE_STEP else", "if True else"),
+        ("if evidence.shear > COARSE_STEP and", "if"),
+        ("key=lambda name: lost.get(name, 0.0))] =", "key=lambda name: -lost.get(name, 0.0))] ="),
         ("kept * expected, kept * bound", "expected, kept * bound"),
     ),
     *mutants_of(

@@ -145,9 +145,20 @@ MUTANTS = [
         (f"{TESTS}/test_measured_friction.py", f"{TESTS}/test_infer_sequence.py"),
         ("if check is None or check.agrees or assessed", "if check is None or assessed"),
         ("forces if k == 0 else frames[k]", "forces if k == 1 else frames[k]"),
+        ("if len(snapshots) != 1:", "if snapshots:"),
         ("penalise_friction(frames[k], check, measured=measured)", "frames[k]"),
         ("return limit_for_smoothing(frame) if smoothed else frame", "return frame"),
         ("check.given, check.measured)", "check.measured, check.measured)"),
+    ),
+    *mutants_of(
+        "solver/sequence/ensemble.py",
+        f"{TESTS}/test_infer_sequence.py",
+        ("wall_total = unit * count", "pass"),
+    ),
+    *mutants_of(
+        "app/verdicts/table.py",
+        "tests/app/verdicts/test_log.py",
+        ("if apart > MAX_GAP:", "if apart < 0.0:"),
     ),
     *mutants_of(
         "app/inference/solve_frames.py",

@@ -196,7 +196,10 @@ def test_a_wrong_friction_widens_by_fractions_of_the_force_and_of_the_mean(frame
 
 
 def test_standard_deviations_are_what_was_fitted(frame):
-    """Of the motion, T = 0.9: factor of the group · exp(5.37 · 0.1 + 0.04 ln(c/500)) · 0.2 (s/0.2)^0.91, and of f_t."""
+    """Of the motion, T = 0.9: factor of the group · exp(5.37 · 0.1 + 0.04 ln(c/500)) · 0.2 (s/0.2)^0.91, and of f_t.
+
+    The error of the model, .06 and .02 of the mean force, is added in quadrature.
+    """
     mean = frame.fn[frame.fn > 0].mean()
     size = np.log((frame.fn > 0).sum() / 500.0)
     plain = ~frame.contacts.with_wall & (frame.bearing_probability == 1.0)
@@ -205,10 +208,10 @@ def test_standard_deviations_are_what_was_fitted(frame):
         row = np.flatnonzero(plain & (groups_of(frame) == group))[-1]
         s = np.hypot(0.1 * frame.fn[row] / mean, 0.02)
         expected = mean * fn_factor * np.exp(5.37 * 0.1 + 0.04 * size) * 0.2 * (s / 0.2) ** 0.91
-        assert calibrated.fn_sd[row] == pytest.approx(expected)
+        assert calibrated.fn_sd[row] == pytest.approx(np.hypot(expected, 0.06 * mean))
         s = np.hypot(0.03 * frame.fn[row] / mean, 0.006)
         expected = mean * ft_factor * np.exp(4.28 * 0.1 + 0.04 * size) * 0.06 * (s / 0.06) ** 0.82
-        assert calibrated.ft_sd[row] == pytest.approx(expected)
+        assert calibrated.ft_sd[row] == pytest.approx(np.hypot(expected, 0.02 * mean))
 
 
 def test_a_fraction_of_the_step_between_two_frictions_widens_by_that_fraction(frame):
