@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
+import numpy as np
 from pydantic import ValidationError
 
 from .experiment.config.experiment_file import ExperimentFile
@@ -14,6 +15,8 @@ from .results.hdf5.store import load_results, origin_of
 from .results.results import Results, TruthContacts
 from .results.truth import names_in_table, names_of_given, read_truth, true_ids, true_names
 from .run_folder import Run, find_experiment
+
+MOST_APART = 0.5  # of true forces whose grains are far apart: wrong ids in some photographs are left to the score
 
 
 def truth_of(file: Path) -> TruthContacts | None:
@@ -55,14 +58,16 @@ def load_truth(run: Run, results: Results, file: Path | None = None) -> TruthCon
         ids = find_names(folder / config.truth_tracks, results.tracks, first)
     else:
         refuse_unnamed_truth(run)
-    return read_truth(
-        file if file is not None else folder / str(config.truth),
+    file = file if file is not None else folder / str(config.truth)
+    truth = read_truth(
+        file,
         ids,
         results.walls.name,
         frames=run.frames,
         frame_count=len(results.frames),
         unseen=None if config.truth_tracks is None else true_ids(folder / config.truth_tracks),
-    ).outside(results.tracks.boundary)
+    )
+    return _of_same_grains(truth, results, file).outside(results.tracks.boundary)
 
 
 def truth_beside(results_file: Path, results: Results, file: Path) -> TruthContacts:
@@ -93,9 +98,26 @@ def truth_beside(results_file: Path, results: Results, file: Path) -> TruthConta
         ids, unseen = find_names(poses, results.tracks, frames.start), true_ids(poses)
     elif config is not None:
         _refuse_unnamed(config, results_file)
-    return read_truth(
-        file, ids, results.walls.name, frames=frames, frame_count=len(results.frames), unseen=unseen
-    ).outside(results.tracks.boundary)
+    truth = read_truth(file, ids, results.walls.name, frames=frames, frame_count=len(results.frames), unseen=unseen)
+    return _of_same_grains(truth, results, file).outside(results.tracks.boundary)
+
+
+def _of_same_grains(truth: TruthContacts, results: Results, file: Path) -> TruthContacts:
+    """Return the truth; raise InputError where most of its forces act between grains that are far apart in the run."""
+    tracks, n = results.tracks, results.grains.count
+    pairs = (truth.j < n) & (truth.fn > 0.0)
+    frame, i, j = truth.frame[pairs], truth.i[pairs], truth.j[pairs]
+    if results.walls.cell is not None or not len(frame):
+        return truth
+    reach = 2.0 * (tracks.radius[i] + tracks.radius[j])
+    apart = np.linalg.norm(tracks.position[frame, i] - tracks.position[frame, j], axis=1) > reach  # NaN: not known
+    if apart.mean() > MOST_APART:
+        raise InputError(
+            file, "",
+            f"names other grains than this run: {apart.sum()} of its {len(apart)} forces act between grains that are "
+            "more than a diameter apart",
+        )  # fmt: skip
+    return truth
 
 
 def _stored_config(results: Results) -> ExperimentFile | None:
