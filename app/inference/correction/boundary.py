@@ -89,12 +89,12 @@ def correct_camera(
         if not found.applied:  # calibration finds a lesser distortion with the walls
             return tracks, walls, "", None
         # Touching surfaces of hard grains meet by other distances, or by other radii if read in the same picture.
-        if material.stiffness is None:
+        if material.stiffness != "rigid":
             undistorted = replace(tracks, position=found.correct(tracks.position))
             overlap = find_soft_overlap(*pack_seen(material, undistorted, walls, failed))
             if _stretching(found) < ANISOTROPIC * overlap / (2.0 * float(tracks.radius.mean())):
                 return tracks, walls, "", None
-            soft = overlap > 0.0  # overlaps are forces then, and no error of the scale
+            soft = soft or overlap > 0.0  # overlaps are forces then, and no error of the scale
         scale = 1.0 if soft else found.common_scale()
         distance, radius = (scale, tracks.radius) if radii_known else (1.0, tracks.radius / scale)
         corrected = found.correct_scaled(position, distance)

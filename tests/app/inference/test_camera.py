@@ -76,11 +76,14 @@ def test_overlaps_of_soft_grains_are_no_error_of_the_scale(given, monkeypatch) -
     assert "multiplied" not in sentence
 
 
-def test_overlaps_that_are_larger_along_the_greatest_stress_are_no_stretching(given, monkeypatch) -> None:
+@pytest.mark.parametrize("stiffness", [None, "estimate", 1e7])
+def test_overlaps_that_are_larger_along_the_greatest_stress_are_no_stretching(given, monkeypatch, stiffness) -> None:
     tracks, walls = given
     seen = replace(tracks, position=stretched(tracks.position)), replace(walls, endpoints=stretched(walls.endpoints))
     monkeypatch.setattr(boundary, "find_soft_overlap", lambda *_: 4e-4)
-    corrected, moved, sentence, found = correct_camera(MATERIAL, *seen, (), radii_known=True)
+    corrected, moved, sentence, found = correct_camera(
+        replace(MATERIAL, stiffness=stiffness), *seen, (), radii_known=True
+    )
     assert corrected is seen[0]
     assert moved is seen[1]
     assert (sentence, found) == ("", None)
