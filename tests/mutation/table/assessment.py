@@ -69,6 +69,8 @@ MUTANTS = [
     *mutants_of(
         "solver/assessment/expected_correlation.py",
         (EXPECTED, PENALTIES),
+        ("fraction_seen(evidence) * evidence.agreement - CONFIRMED_MARGIN", "evidence.agreement - CONFIRMED_MARGIN"),
+        ("return max(bound, confirmed_correlation(evidence))", "return bound"),
         ("lambda e: 1.0 - e.agreement", "lambda e: e.agreement"),
         ("return float(weaken(value, seen)) if name in BY_SLIDING else value", "return value"),
         ("np.where(np.greater(value, 0.0), strength * value, value)", "np.asarray(strength * value)"),

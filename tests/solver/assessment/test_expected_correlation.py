@@ -10,6 +10,7 @@ from rodsight.solver.assessment.expected_correlation import (
     WIDEST,
     bound_correlation,
     closed_overlap,
+    confirmed_correlation,
     correlation_score,
     expect_correlation,
     losses,
@@ -194,3 +195,21 @@ def test_one_photograph_without_a_load_makes_a_prediction_without_one():
     without = replace(BOTH, loaded=False)
     assert predict_correlation([BOTH, without]) == pytest.approx(predict_correlation([without, without]))
     assert predict_correlation([BOTH, BOTH]) != pytest.approx(predict_correlation([without, without]))
+
+
+def test_overlaps_that_the_motion_confirms_are_trusted_by_that_agreement():
+    soft = replace(BOTH.information, soft=True, slide_signal=3.0)
+    poor = replace(BOTH, agreement=0.94, position_agreement=0.3, old_unbalance=0.15, force_change=0.5)
+    overlaps = replace(poor, information=soft, position_weight=0.9)
+    assert confirmed_correlation(overlaps) == pytest.approx(0.94 - 0.05)
+    assert bound_correlation(overlaps) == pytest.approx(0.94 - 0.05)
+    assert expect_correlation(overlaps) >= bound_correlation(overlaps)
+    assert max(losses(overlaps).values()) < max(losses(replace(overlaps, agreement=0.2)).values())
+    for other in (
+        replace(overlaps, position_weight=0.1),
+        replace(overlaps, agreement=math.nan),
+        replace(overlaps, information=replace(soft, soft=False)),
+    ):
+        assert confirmed_correlation(other) == 0.0
+    hidden = replace(overlaps, information=replace(soft, slide_signal=0.1))
+    assert confirmed_correlation(hidden) == pytest.approx(0.1 * 0.94 - 0.05)
