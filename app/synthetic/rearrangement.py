@@ -48,6 +48,9 @@ def choose_window(old_unbalance: Array, frames: int) -> tuple[int, int]:
     tuple of int
         First photograph of the window, and photograph of the event.
     """
+    if frames == 1:  # nothing settles around it
+        event = int(np.argmax(old_unbalance))
+        return event, event
     before, behind = frames // 2, -(-frames // 4)
     last = len(old_unbalance) - behind
     if before < 1 or last < before:

@@ -268,6 +268,7 @@ def test_the_window_holds_the_greatest_event_with_margins_around_it() -> None:
     assert choose_window(calm, 8) == (16, 20)
     calm[37] = 0.4  # three photographs at the end: two (a quarter of the window), itself counted, suffice
     assert choose_window(calm, 8) == (32, 37)
+    assert choose_window(np.array([0.1, 0.3, 0.2]), 1) == (1, 1)
     with pytest.raises(ValueError, match="leave no choice"):
         choose_window(calm[:5], 8)
 
