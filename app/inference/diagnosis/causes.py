@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 from ...results.finding import Finding
 
@@ -113,6 +114,15 @@ CAUSES: dict[str, Cause] = {
         "friction on the base, or inertia",
     ),
 }
+
+
+def name_once(findings: Iterable[Finding]) -> list[Finding]:
+    """Return one finding for every cause, in order, with all its evidence: two tests may find the same one."""
+    found: dict[str, Finding] = {}
+    for each in findings:
+        known = found.get(each.cause)
+        found[each.cause] = each if known is None else replace(known, evidence=f"{known.evidence}; {each.evidence}")
+    return list(found.values())
 
 
 def finding(cause: str, evidence: str) -> Finding:

@@ -23,7 +23,7 @@ from ...solver.bodies.grains import Array
 from ..correction.correct_sequence import complete_walls, correct_sequence
 from ..correction.outliers import restore_exchanged_ids
 from ..inputs import Inputs
-from .causes import finding
+from .causes import finding, name_once
 from .data_quality import measure_data_quality
 from .direct_tests import (
     examine_inertia,
@@ -113,7 +113,7 @@ def diagnose(
         found = [each for each in found if each.cause != "not_explained"]
     if found:  # wrong radii look like a few jumps
         poses = [each for each in poses if each.cause != "outlier_tracks"]
-    return [*found, *names, *camera, *poses]
+    return name_once([*found, *names, *camera, *poses])
 
 
 def _compare_rivals(

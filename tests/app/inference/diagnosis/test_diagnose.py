@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rodsight.inference.diagnosis import diagnose as module
 from rodsight.inference.diagnosis import distortion
-from rodsight.inference.diagnosis.causes import CAUSES
+from rodsight.inference.diagnosis.causes import CAUSES, finding, name_once
 from rodsight.inference.diagnosis.diagnose import diagnose
 from rodsight.inference.diagnosis.rivals import rivals_of
 from rodsight.inference.diagnosis.trial import Trial
@@ -181,6 +181,11 @@ def test_the_documentation_lists_every_cause():
     page = (ROOT / "app/docs/trust.md").read_text(encoding="utf-8")
     for name, cause in CAUSES.items():
         assert f"| `{name}` | {cause.effect} | {cause.cure} |" in page
+
+
+def test_a_cause_that_two_tests_find_is_named_once_with_the_evidence_of_both():
+    found = name_once([finding("lens", "a"), finding("friction", "b"), finding("lens", "c")])
+    assert [(each.cause, each.evidence) for each in found] == [("lens", "a; c"), ("friction", "b")]
 
 
 @pytest.mark.parametrize(("expected", "compared"), [

@@ -21,7 +21,7 @@ def test_another_friction_is_named_unless_the_forces_fit_the_given_one(monkeypat
     monkeypatch.setattr(prediction, "Inputs", lambda *_: None)
     monkeypatch.setattr(prediction, "solve_trial", lambda *_, **__: SimpleNamespace(expected=(expected, 0.9, 1.0)))
     monkeypatch.setattr(prediction, "diagnose", lambda *_: found)
-    predicted = prediction.predict_accuracy(None, None, SimpleNamespace())  # type: ignore[arg-type]
+    predicted = prediction.predict_accuracy(None, SimpleNamespace(frame_count=2), SimpleNamespace())  # type: ignore[arg-type]
     assert [each.cause for each in predicted.diagnosis] == named
 
 
