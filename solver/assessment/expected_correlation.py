@@ -140,12 +140,14 @@ def confirmed_correlation(evidence: Evidence) -> float:
 
     Notes
     -----
-    max(s c − .05, 0) with c the agreement of both estimates and s the fraction of the sliding that is seen. Estimates
-    whose errors have different causes correlate by c = r_1 r_2, so that neither is below c.
+    max(k s c − .05, 0) with c the agreement of both estimates, s the fraction of the sliding that is seen, and k the
+    factor by which T falls where gaps are wider than any that was fitted. Estimates whose errors have different causes
+    correlate by c = r_1 r_2, so that neither is below c; errors of the positions as large as that are in both.
     """
     if not rests_on_overlaps(evidence) or math.isnan(evidence.agreement):
         return 0.0
-    return max(fraction_seen(evidence) * evidence.agreement - CONFIRMED_MARGIN, 0.0)
+    known = fraction_seen(evidence) * _known_fraction(evidence)
+    return max(known * evidence.agreement - CONFIRMED_MARGIN, 0.0)
 
 
 def rests_on_overlaps(evidence: Evidence) -> bool:

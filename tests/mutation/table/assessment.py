@@ -69,7 +69,8 @@ MUTANTS = [
     *mutants_of(
         "solver/assessment/expected_correlation.py",
         (EXPECTED, PENALTIES),
-        ("fraction_seen(evidence) * evidence.agreement - CONFIRMED_MARGIN", "evidence.agreement - CONFIRMED_MARGIN"),
+        ("known = fraction_seen(evidence) * _known", "known = 1.0 * _known"),
+        ("fraction_seen(evidence) * _known_fraction(evidence)", "fraction_seen(evidence)"),
         ("return max(bound, confirmed_correlation(evidence))", "return bound"),
         ("lambda e: 1.0 - e.agreement", "lambda e: e.agreement"),
         ("return float(weaken(value, seen)) if name in BY_SLIDING else value", "return value"),

@@ -211,5 +211,7 @@ def test_overlaps_that_the_motion_confirms_are_trusted_by_that_agreement():
         replace(overlaps, information=replace(soft, soft=False)),
     ):
         assert confirmed_correlation(other) == 0.0
+    wide = replace(soft, gap_error=2.0 * WIDEST * soft.diameter, unexplained_gap=2.0 * WIDEST * soft.diameter)
+    assert confirmed_correlation(replace(overlaps, information=wide)) == pytest.approx(0.5 * 0.94 - 0.05)
     hidden = replace(overlaps, information=replace(soft, slide_signal=0.1))
     assert confirmed_correlation(hidden) == pytest.approx(0.1 * 0.94 - 0.05)
