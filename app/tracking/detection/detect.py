@@ -3,8 +3,7 @@
 Candidate circles are found by the slope along rings of every radius. Each is then tested by its own outline at full
 resolution: edges towards the dark between the grains, wherever there is dark. Contacts have no edge and are ignored.
 The common displacement of all edges (the blur's definition of an edge, the mean shading of the rims) is measured over
-all grains and removed where the radii are known, so that an outline that is visible on one side does not bias the
-centre.
+all grains and removed where the radii are known, so that an outline seen on one side does not bias the centre.
 """
 
 from __future__ import annotations

@@ -44,8 +44,7 @@ STEPS = ("photographs", "scale", "walls", "rods", "material")
 OF_KEYS = {  # the step of a key: the longest prefix counts
     "photographs": "photographs", "photographs.pixel_size": "scale", "photographs.distance": "scale",
     "photographs.lens": "scale", "photographs.radii": "rods", "photographs.grains": "rods", "walls": "walls",
-    "boundary": "walls",
-    "material": "material",
+    "boundary": "walls", "material": "material",
 }  # fmt: skip
 MOSTLY = 0.8  # fraction of the rods beyond a wall above which the walls are wrong, not the rods
 UNLIKE = 1.5  # ratio of the rods' radii and the known ones above which the scale is in question
