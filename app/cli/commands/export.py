@@ -9,7 +9,7 @@ import tyro
 from rich.console import Console
 
 from ...process.errors import InputError
-from ..arguments import Frames, Quiet, parse_frames, refuse_step
+from ..arguments import Frames, Quiet, parse_frames, refuse_step, refuse_unused
 from ..stored_results import recording_file, results_file, warn_out_of_date
 from ..terminal import print_line, progress_of
 
@@ -90,6 +90,8 @@ def export(
     from ...results.hdf5.store import load_results
 
     _refuse_other_options(what, given)
+    if figure is not None:
+        refuse_unused("export", {"--timeline": timeline, "--tab": tab, "--view": view}, "with --figure")
     console = Console(quiet=quiet)
     warn_out_of_date(source)
     folder = source if source.is_dir() else source.parent
@@ -152,6 +154,8 @@ def share(
     if (source is None) == (repair is None):
         raise InputError("share", "", "give either a run's folder or recording, or --repair FILE")
     if repair is not None:
+        given = {"--frames": frames, "--scale": scale != 1.0, "--html": html}
+        refuse_unused("share", given | {"--although-out-of-date": although_out_of_date}, "with --repair")
         return _repair(repair, out, console)
     assert source is not None
     recording = recording_file(source)
