@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow
 import pyarrow.parquet
 import pytest
+import rodsight
 
 from .command import import_files, refuse, tracks_in, walls_in
 
@@ -80,6 +81,15 @@ def test_a_table_without_a_header_has_numbered_columns(tmp_path, capsys):
     assert tracks.radius.tolist() == [0.1, 0.1]
     assert np.isnan(tracks.rotation).all()
     assert "rotation is unknown" in printed
+
+
+def test_the_check_of_an_imported_table_names_no_column_of_the_importer(tmp_path, capsys):
+    import_files(
+        capsys, "table", write(tmp_path / "any.csv"), tmp_path / "out", "--columns", COLUMNS, "--pixel-size", PIXEL,
+        "--y-down", "--degrees", "--walls", "box",
+    )  # fmt: skip
+    assert "number" in (tmp_path / "out/times.csv").read_text()
+    assert rodsight.check(tmp_path / "out", predict=False)["unused"] == ()
 
 
 def test_y_is_measured_from_the_last_row_with_a_given_height(tmp_path, capsys):
