@@ -83,6 +83,16 @@ def test_a_table_without_a_header_has_numbered_columns(tmp_path, capsys):
     assert "rotation is unknown" in printed
 
 
+def test_columns_are_given_by_number_where_there_is_a_header(tmp_path, capsys):
+    numbers = "frame=1,id=2,x=3,y=4,theta=5,radius=6"
+    arguments = ("--pixel-size", PIXEL, "--y-down", "--degrees", "--interval", 30)
+    file = write(tmp_path / "any.csv")
+    import_files(capsys, "table", file, tmp_path / "out", "--columns", numbers, *arguments)
+    expect_rows(tmp_path / "out")
+    line = refuse(capsys, "table", file, tmp_path / "no", "--columns", numbers.replace("6", "7"))
+    assert "column 7: there is no such column (columns: t, rod, X, Y, turn, R)" in line
+
+
 def test_the_check_of_an_imported_table_names_no_column_of_the_importer(tmp_path, capsys):
     import_files(
         capsys, "table", write(tmp_path / "any.csv"), tmp_path / "out", "--columns", COLUMNS, "--pixel-size", PIXEL,
