@@ -23,6 +23,7 @@ _NUMBER = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s
 _LINE = re.compile(r"at line (\d+)")
 _ASSIGNMENT = re.compile(r"\s*([\w.-]+)\s*=\s*([^#]*?)\s*(?:#.*)?")
 SOLID_DENSITIES = (10.0, 2.3e4)  # [kg/m³] the lightest foams for packaging; osmium has 22 590
+GREATEST_RADIUS = 0.5  # [m] of a rod
 DENSITIES_IN_OTHER_UNITS = (1e3, 1e-3)  # g/cm³ and g/m³, as factors to kg/m³
 MIN_SIMILARITY = 0.7  # of a word that the user may have meant
 DIGITS = 12  # of a converted number
@@ -40,6 +41,11 @@ def read_quantity(text: str, unit: str) -> float | None:
     factors = FACTORS.get(unit, {})
     factor = factors.get(plain if unit == "m" else plain.lower())
     return None if factor is None else float(f"{number * factor:.{DIGITS}g}")
+
+
+def look_like_millimetres(radius: float) -> bool:
+    """Whether a radius, which should be in metres, is larger than that of any rod, and plausible in millimetres."""
+    return GREATEST_RADIUS < radius < 1e3 * GREATEST_RADIUS
 
 
 def correct_value(name: str, value: Any, kind: str, unit: str) -> str | None:

@@ -87,7 +87,7 @@ def test_a_mistake_of_photographs_is_named_with_what_to_write(tmp_path, capsys, 
     ("radii", "named"),
     [
         ("[0.0001]", "are 0.4 px at this pixel_size, but must exceed 3 px: correct one of both"),
-        ("[1.0]", "of the radii photographs.radii, 4e+03 px at this pixel_size: correct one of both"),
+        ("[0.5]", "of the radii photographs.radii, 2e+03 px at this pixel_size: correct one of both"),
     ],
 )
 def test_radii_that_do_not_fit_the_photograph_are_named_in_pixels(made_photographs, tmp_path, capsys, radii, named):
