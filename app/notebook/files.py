@@ -12,13 +12,14 @@ import pandas as pd
 
 from ..exchange.foreign.format_names import FileFormat
 from ..exported_files import Drawing, ExportKind, draw_pictures, write_data, write_run_figures
-from ..process.errors import InputError
+from ..process.errors import InputError, naming
 from ..run_folder import RECORDING
 from .comparisons import Source, as_run
 from .shown_progress import shown_progress
 
 DRAWN = ("pictures", "video")
 FIGURES = "figures"
+DATA_FRAME = "data frame"  # its name in messages
 
 
 class ImportOptions(TypedDict, total=False):
@@ -113,10 +114,11 @@ def import_table(
     if "pairs" in others:
         others["pairs"] = Path(others["pairs"])
     with tempfile.TemporaryDirectory(prefix="rodsight-") as place:
-        file = Path(place) / "data_frame.csv" if isinstance(source, pd.DataFrame) else Path(source)
+        file = Path(place) / DATA_FRAME if isinstance(source, pd.DataFrame) else Path(source)
         if isinstance(source, pd.DataFrame):
             source.to_csv(file, index=False)
-        imported, _ = import_files(ImportRequest(form, file, columns or {}, **others), Path(folder))
+        with naming(Path(place) / DATA_FRAME, DATA_FRAME):
+            imported, _ = import_files(ImportRequest(form, file, columns or {}, **others), Path(folder))
     tracks = imported.tracks
     frame, grain = tracks.present.nonzero()
     table = pd.DataFrame(
