@@ -74,10 +74,8 @@ def what_if(
 
     Raises
     ------
-    IndexError
-        If there is no such frame.
     InputError
-        A body is unknown, a forbidden contact does not exist or contacts are forced (local), or the input of the run
+        There is no such frame (an IndexError as well), a body is unknown, a forbidden contact does not exist or contacts are forced (local), or the input of the run
         changed on the disk.
 
     Examples

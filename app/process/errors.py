@@ -19,6 +19,18 @@ class InputError(Exception):
         self.problem = problem  # without the file and the place in it
 
 
+class MissingFileError(InputError, FileNotFoundError):
+    """A file or folder that the input names does not exist."""
+
+
+class MissingFrameError(InputError, IndexError):
+    """The input names a frame that does not exist."""
+
+
+class FigureError(InputError, ValueError):
+    """The input requests a figure that does not exist, or for which there are no data."""
+
+
 @contextmanager
 def naming(file: Path, name: str) -> Iterator[None]:
     """Name a temporary file in bad input of the block as what the user gave: a data frame, a folder to be made."""

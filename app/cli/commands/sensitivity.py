@@ -7,7 +7,18 @@ from typing import Annotated, Literal
 
 import tyro
 
-from ..arguments import AsJson, ExperimentPath, Frames, Out, Quiet, Scheduler, Settings, Workers, refuse_unused, worker_count
+from ..arguments import (
+    AsJson,
+    ExperimentPath,
+    Frames,
+    Out,
+    Quiet,
+    Scheduler,
+    Settings,
+    Workers,
+    refuse_unused,
+    worker_count,
+)
 from ..terminal import table_console
 from .run import Request, open_run
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
 import pandas as pd
 import pytest
 import rodsight
@@ -18,3 +22,43 @@ def test_a_wrong_data_frame_is_called_a_data_frame(tmp_path):
     spots["X"] = [0.1, 0.12]
     rodsight.import_table(spots, tmp_path / "out", roles | {"x": "X"}, radius=0.01)
     assert (tmp_path / "out/experiment.toml").read_text().startswith("# From data frame, by rodsight import table.\n")
+
+
+@pytest.fixture(scope="module")
+def run(examples: Path) -> rodsight.Run:
+    return rodsight.Run(examples / "runs/shear/results.h5")
+
+
+@pytest.mark.parametrize(
+    ("kind", "call"),
+    [
+        (FileNotFoundError, lambda run: rodsight.open("nosuch")),
+        (FileNotFoundError, lambda run: rodsight.score("nosuch")),
+        (FileNotFoundError, lambda run: rodsight.compare(run, "nosuch")),
+        (IndexError, lambda run: run.contacts(frame=99)),
+        (IndexError, lambda run: rodsight.what_if(run, 99)),
+        (ValueError, lambda run: run.figure("nosuch")),
+        (ValueError, lambda run: run.figure("fringes")),
+        (rodsight.InputError, lambda run: run.figure(width="triple")),
+        (rodsight.InputError, lambda run: run.figure("difference", against="runs/shear")),
+        (rodsight.InputError, lambda run: rodsight.run("my_test", frames=(3,))),  # type: ignore[arg-type]
+        (rodsight.InputError, lambda run: rodsight.track("my_test", frames=("a", "b"))),  # type: ignore[arg-type]
+        (rodsight.InputError, lambda run: rodsight.run("my_test", frames=(0, None, 0))),
+        (rodsight.InputError, lambda run: next(rodsight.follow("my_test", idle="soon"))),  # type: ignore[arg-type]
+    ],
+)
+def test_mistakes_are_input_errors_and_of_the_usual_kind(
+    kind: type[Exception], call: Callable[[rodsight.Run], Any], run, examples, monkeypatch
+):
+    monkeypatch.chdir(examples)
+    with pytest.raises(rodsight.InputError) as raised:
+        call(run)
+    assert isinstance(raised.value, kind)
+    assert str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_run_without_a_recording_is_a_missing_file(run, tmp_path):
+    with pytest.raises(rodsight.InputError, match=r"^there is no recording of this run: ") as raised:
+        rodsight.Run(tmp_path / "results.h5").view()
+    assert isinstance(raised.value, FileNotFoundError)
