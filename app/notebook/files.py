@@ -11,7 +11,16 @@ from typing import Any, Literal, TypedDict, Unpack, get_args
 import pandas as pd
 
 from ..exchange.foreign.format_names import FileFormat
-from ..exported_files import Drawing, ExportKind, draw_pictures, write_data, write_run_figures
+from ..exported_files import (
+    Drawing,
+    ExportKind,
+    TableForm,
+    Timeline,
+    check_options,
+    draw_pictures,
+    write_data,
+    write_run_figures,
+)
 from ..process.errors import InputError, naming
 from ..run_folder import RECORDING
 from .comparisons import Source, as_run
@@ -41,10 +50,10 @@ class ImportOptions(TypedDict, total=False):
 class ExportOptions(TypedDict, total=False):
     """Options of `rodsight export`, each for some kinds."""
 
-    kind: Literal["csv", "parquet"]
+    kind: TableForm
     pixel_size: float
     frames: tuple[int, int | None]
-    timeline: Literal["frame", "sweep"]
+    timeline: Timeline
     step: int
     tab: str
     view: str
@@ -173,6 +182,9 @@ def export(
     for name in options:
         if name not in ExportOptions.__annotations__:
             raise InputError("export", name, f"is not an option: there are {', '.join(ExportOptions.__annotations__)}")
+    if "formats" in options and isinstance(options["formats"], str):
+        options["formats"] = (options["formats"],)
+    check_options(what, options)
     target = None if out is None else Path(out)
     if run.file is None and (target is None or what in (*DRAWN, FIGURES)):
         raise InputError("export", what, "needs a run with a folder, or for data the argument out")

@@ -75,8 +75,8 @@ def what_if(
     Raises
     ------
     InputError
-        There is no such frame (an IndexError as well), a body is unknown, a forbidden contact does not exist or contacts are forced (local), or the input of the run
-        changed on the disk.
+        There is no such frame (an IndexError as well), a body is unknown, a forbidden contact does not exist or
+        contacts are forced (local), or the input of the run changed on the disk.
 
     Examples
     --------

@@ -59,18 +59,17 @@ def record_comparison(comparison: Comparison, path: Path | str, *, scale: Scale 
     )  # fmt: skip
     rr.set_strict_mode(True)
     stream = rr.RecordingStream(APPLICATION_ID)
-    with replacing(path) as part:
-        with writing(stream, part, make_comparison_blueprint(comparison, canvas)):
-            stream.set_log_time_enabled(False)
-            stream.send_recording_name(printable(scene.name))
-            axes = _log_styles(stream, scene, comparison)
-            strains = accumulated_strains([forces.strain for forces in base.frames])
-            for frame, strain in enumerate(strains):
-                clock = Clock(stream, frame, frame, frame, float(base.tracks.time[frame]), strain)
-                _log_frame(clock, scene, comparison, axes)
-            stream.reset_time()
-            text = rr.TextDocument(printable(describe(comparison)), media_type=rr.MediaType.MARKDOWN)
-            stream.log(SUMMARY, text, static=True)
+    with replacing(path) as part, writing(stream, part, make_comparison_blueprint(comparison, canvas)):
+        stream.set_log_time_enabled(False)
+        stream.send_recording_name(printable(scene.name))
+        axes = _log_styles(stream, scene, comparison)
+        strains = accumulated_strains([forces.strain for forces in base.frames])
+        for frame, strain in enumerate(strains):
+            clock = Clock(stream, frame, frame, frame, float(base.tracks.time[frame]), strain)
+            _log_frame(clock, scene, comparison, axes)
+        stream.reset_time()
+        text = rr.TextDocument(printable(describe(comparison)), media_type=rr.MediaType.MARKDOWN)
+        stream.log(SUMMARY, text, static=True)
     return path.stat().st_size
 
 

@@ -71,18 +71,17 @@ def record_side_file(results: Results, recording: Path | str, target: Path | str
     stream = rr.RecordingStream(
         entry.application_id, recording_id=entry.recording_id, send_properties=False, batcher_config=BATCHES
     )
-    with replacing(target) as part:
-        with writing(stream, part):
-            stream.set_log_time_enabled(False)
-            first = 0
-            strains = accumulated_strains([forces.strain for forces in results.frames])
-            for forces, strain in zip(results.frames, strains, strict=True):
-                span = forces.history.count + 1
-                if forces.frame in frames and forces.contacts.count:
-                    time = float(results.tracks.time[forces.frame])
-                    clock = Clock(stream, forces.frame, first, first + span - 1, time, strain)
-                    rows, fn, _ = visible_sweeps(forces, span - 1, SweepChoice.ALL, 0)
-                    # The first row, with the geometry, is in the recording.
-                    send_sweeps(clock, style, rows[1:], fn[1:], thin=True)
-                first += span
+    with replacing(target) as part, writing(stream, part):
+        stream.set_log_time_enabled(False)
+        first = 0
+        strains = accumulated_strains([forces.strain for forces in results.frames])
+        for forces, strain in zip(results.frames, strains, strict=True):
+            span = forces.history.count + 1
+            if forces.frame in frames and forces.contacts.count:
+                time = float(results.tracks.time[forces.frame])
+                clock = Clock(stream, forces.frame, first, first + span - 1, time, strain)
+                rows, fn, _ = visible_sweeps(forces, span - 1, SweepChoice.ALL, 0)
+                # The first row, with the geometry, is in the recording.
+                send_sweeps(clock, style, rows[1:], fn[1:], thin=True)
+            first += span
     return target.stat().st_size

@@ -62,3 +62,22 @@ def test_a_run_without_a_recording_is_a_missing_file(run, tmp_path):
     with pytest.raises(rodsight.InputError, match=r"^there is no recording of this run: ") as raised:
         rodsight.Run(tmp_path / "results.h5").view()
     assert isinstance(raised.value, FileNotFoundError)
+
+
+@pytest.mark.parametrize(
+    ("what", "options", "words"),
+    [
+        ("tables", {"kind": "xml"}, r"^export: kind 'xml': is not one of csv, parquet$"),
+        ("tables", {"rate": 5.0}, r"^export: rate with tables: applies to video only$"),
+        ("figures", {"formats": ("pdf", "xml")}, r"^export: formats 'xml': is not one of pdf, svg, png$"),
+        ("figures", {"formats": "xml"}, r"^export: formats 'xml': is not one of pdf, svg, png$"),
+        ("figures", {"width": "triple"}, r"^export: width 'triple': is not one of single, double$"),
+        ("pictures", {"timeline": "year"}, r"^export: timeline 'year': is not one of frame, sweep$"),
+        ("pictures", {"size": (1, 1)}, r"^--size: 1x1: is not WIDTHxHEIGHT in pixels from 100 to 8192$"),
+        ("pictures", {"step": 0}, r"^--step: 0: is not a positive number$"),
+    ],
+)
+def test_an_export_with_wrong_options_is_refused_before_anything_is_written(run, what, options, words, tmp_path):
+    with pytest.raises(rodsight.InputError, match=words):
+        rodsight.export(what, run, out=tmp_path / "out", **options)
+    assert not (tmp_path / "out").exists()
