@@ -81,3 +81,12 @@ def test_an_export_with_wrong_options_is_refused_before_anything_is_written(run,
     with pytest.raises(rodsight.InputError, match=words):
         rodsight.export(what, run, out=tmp_path / "out", **options)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("key", ["walls.top.pressure", "tracks.precision", "photographs.files", "name", "truth"])
+def test_a_key_of_the_measurement_is_no_setting_of_tables(key):
+    table = pd.DataFrame({"frame": [0], "id": [0], "x": [0.0], "y": [0.0], "radius": [0.01], "time": [0.0]})
+    with pytest.raises(rodsight.InputError, match="is read from experiment.toml alone: keys of material, ") as raised:
+        rodsight.solve(table, settings={key: 3})
+    assert f"key {key.partition('.')[0]}" in str(raised.value)
+    assert "did you mean" not in str(raised.value)
