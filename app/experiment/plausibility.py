@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, KDTree
@@ -48,22 +50,32 @@ def check_packing(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> 
 
 
 def check_radii(experiment: Experiment, tracks: Tracks) -> None:
+    """Raise InputError where radii do not fit the positions, or their stated precision."""
+    section = experiment.config.tracks
+    if section is None:
+        refuse_radii(tracks, experiment.file, "key photographs.pixel_size or photographs.radii")
+        return
+    refuse_radii(tracks, experiment.folder / section.grains, "column radius")
+    refuse_precision(tracks, section.precision, experiment.file, f"key tracks.precision = {section.precision:g}")
+
+
+def refuse_precision(tracks: Tracks, precision: float, file: Path | str, key: str) -> None:
+    """Raise InputError where the standard deviation of a position [m] is larger than the rods' radius."""
+    middle = float(np.median(tracks.radius))
+    if precision > middle:
+        problem = f"is more than the rods' radius, {middle:g} m: it is the standard deviation of a position, in metres"
+        raise InputError(file, key, problem)
+
+
+def refuse_radii(tracks: Tracks, file: Path, key: str) -> None:
     """Raise InputError where nearest neighbours are not about the sum of two radii apart, since packed rods touch.
 
-    Typical causes are diameters given as radii, a wrong unit or a wrong scale.
+    Typical causes are diameters given as radii, a wrong unit or a wrong scale. file and key: where radii are from.
     """
-    section = experiment.config.tracks
-    file = experiment.file if section is None else experiment.folder / section.grains
-    key = "key photographs.pixel_size or photographs.radii" if section is None else "column radius"
     middle = float(np.median(tracks.radius))
     if middle > GREATEST_RADIUS:
         guess = "; they look like millimetres" if look_like_millimetres(middle) else ""
         raise InputError(file, key, f"makes the median radius {middle:g} m: lengths are in metres{guess}")
-    if section is not None and section.precision > middle:
-        raise InputError(
-            experiment.file, f"key tracks.precision = {section.precision:g}",
-            f"is more than the rods' radius, {middle:g} m: it is the standard deviation of a position, in metres",
-        )  # fmt: skip
     here, largest = tracks.position[0][tracks.present[0]], int(np.argmax(tracks.radius))
     across = float(np.hypot(*np.ptp(here, axis=0))) if len(here) > 2 else np.inf
     if tracks.radius[largest] > max(GREATEST_FRACTION * across, middle):

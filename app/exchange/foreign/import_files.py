@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from numbers import Real
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
+from ...experiment.plausibility import refuse_precision, refuse_radii
 from ...process.errors import InputError
 from .experiment_folder import FolderContents, refuse_existing, write_folder
 from .file_formats import ImportedData, read_format
@@ -45,9 +48,11 @@ class ImportRequest:
     pairs: Path | None = None  # pair forces of a simulation [N], as truth
 
     def __post_init__(self) -> None:
+        if self.form not in get_args(FileFormat):
+            raise InputError("import", repr(self.form), f"is not a form: there are {', '.join(get_args(FileFormat))}")
         for name in ("pixel_size", "interval", "precision", "height", "radius", "corner_radius"):
             value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value > 0.0):
+            if value is not None and not (isinstance(value, Real) and math.isfinite(value) and value > 0.0):
                 raise InputError(f"--{name.replace('_', '-')}", str(value), "is not positive")
 
 
@@ -72,6 +77,10 @@ def import_files(request: ImportRequest, folder: Path) -> tuple[ImportedTracks, 
     height = None if request.height is None else request.height - 1.0
     convention = replace(foreign.convention, y_down=foreign.convention.y_down or request.y_down, height=height)
     imported = make_tracks(foreign.observed, convention, foreign.precision_of(request.precision))
+    refuse_radii(imported.tracks, request.source, _origin_of_radii(request))
+    if request.precision is not None:
+        precision = foreign.precision_of(request.precision)
+        refuse_precision(imported.tracks, precision, "--precision", f"{precision:g} m")
     discs = None if corners is None else make_corners(corners, imported, convention, request.corner_radius)
     contents = replace(_folder_contents(request, foreign, imported, convention), corners=discs)
     if foreign.truth is not None:
@@ -87,6 +96,14 @@ def import_files(request: ImportRequest, folder: Path) -> tuple[ImportedTracks, 
         imported = replace(imported, remarks=(*imported.remarks, *remarks))
     write_folder(folder, imported, contents, f"From {request.source.name}, by rodsight import {request.form}.")
     return imported, contents
+
+
+def _origin_of_radii(request: ImportRequest) -> str:
+    """Return the column or the option that gives the radii, for messages."""
+    column = request.columns.get("radius") or request.columns.get("diameter")
+    if column is not None:
+        return f"column {column}"
+    return "column radius" if request.radius is None else "--radius"
 
 
 def _times_of(observed: Observations) -> list[float]:

@@ -19,6 +19,9 @@ def test_a_wrong_data_frame_is_called_a_data_frame(tmp_path):
     assert raised.value.problem.startswith("there is no such column")
     with pytest.raises(rodsight.InputError, match=r"^data frame: row 3, X = 'wide': is not a number$"):
         rodsight.import_table(spots, tmp_path / "out", roles | {"x": "X"}, radius=0.01)
+    for option in ({"form": "tables"}, {"pixel_size": "wide"}):
+        with pytest.raises(rodsight.InputError, match=r"is not a form: there are table, |wide: is not positive$"):
+            rodsight.import_table(spots, tmp_path / "out", roles, **option)  # type: ignore[arg-type]
     spots["X"] = [0.1, 0.12]
     rodsight.import_table(spots, tmp_path / "out", roles | {"x": "X"}, radius=0.01)
     assert (tmp_path / "out/experiment.toml").read_text().startswith("# From data frame, by rodsight import table.\n")
@@ -86,7 +89,7 @@ def test_an_export_with_wrong_options_is_refused_before_anything_is_written(run,
 @pytest.mark.parametrize("key", ["walls.top.pressure", "tracks.precision", "photographs.files", "name", "truth"])
 def test_a_key_of_the_measurement_is_no_setting_of_tables(key):
     table = pd.DataFrame({"frame": [0], "id": [0], "x": [0.0], "y": [0.0], "radius": [0.01], "time": [0.0]})
-    with pytest.raises(rodsight.InputError, match="is read from experiment.toml alone: keys of material, ") as raised:
+    with pytest.raises(rodsight.InputError, match=r"is read from experiment\.toml alone: keys of material, ") as raised:
         rodsight.solve(table, settings={key: 3})
     assert f"key {key.partition('.')[0]}" in str(raised.value)
     assert "did you mean" not in str(raised.value)
