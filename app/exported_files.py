@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import io
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 from .process.errors import InputError
 from .process.progress import Progress
@@ -23,6 +23,43 @@ if TYPE_CHECKING:
     from .results.results import Results, TruthContacts
 
 ExportKind = Literal["pictures", "video", "figures", "tables", "vtk", "ovito", "graph", "dic"]
+TableForm = Literal["csv", "parquet"]
+Timeline = Literal["frame", "sweep"]
+# Kinds to which each option applies; out and quiet apply to all.
+KINDS_OF_OPTION: dict[str, tuple[ExportKind, ...]] = {
+    "kind": ("tables",),
+    **dict.fromkeys(("frames", "timeline", "step", "tab", "view", "size", "figure"), ("pictures", "video")),
+    "rate": ("video",),
+    "pixel_size": ("dic",),
+    **dict.fromkeys(("frame", "formats", "width", "set"), ("figures",)),
+}
+CHOICES = {
+    "kind": get_args(TableForm), "timeline": get_args(Timeline), "formats": ("pdf", "svg", "png"),
+    "width": ("single", "double"),
+}  # fmt: skip
+SMALLEST, LARGEST = 100, 8192  # [px] width and height of a picture
+
+
+def check_options(what: ExportKind, given: Mapping[str, object]) -> None:
+    """Raise InputError for an option that does not apply to a kind, or a value that is none of its choices.
+
+    Parameters
+    ----------
+    what : ExportKind
+        What is to be written.
+    given : mapping of str to object
+        Values by option, spelt as in Python or on the command line; None: not given.
+    """
+    for option, value in given.items():
+        if value is None:
+            continue
+        name = option.removeprefix("--").replace("-", "_")
+        if what not in KINDS_OF_OPTION[name]:
+            kinds = " and ".join(KINDS_OF_OPTION[name])
+            raise InputError("export", f"{option} with {what}", f"applies to {kinds} only")
+        for each in value if isinstance(value, tuple | list) else (value,):
+            if name in CHOICES and each not in CHOICES[name]:
+                raise InputError("export", f"{option} {each!r}", f"is not one of {', '.join(CHOICES[name])}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,13 +75,22 @@ class Drawing:
     size: tuple[int, int]  # [px] width and height
     rate: float  # [1/s] pictures of a film
 
+    def __post_init__(self) -> None:
+        if self.step < 1:
+            raise InputError("--step", str(self.step), "is not a positive number")
+        if not 0.0 < self.rate <= 120.0:
+            raise InputError("--rate", str(self.rate), "is not between 0 and 120 pictures a second")
+        if not all(SMALLEST <= side <= LARGEST for side in self.size):
+            size = "x".join(map(str, self.size))
+            raise InputError("--size", size, f"is not WIDTHxHEIGHT in pixels from {SMALLEST} to {LARGEST}")
+
 
 def write_data(
     kind: ExportKind,
     results: Results,
     target: Path,
     *,
-    form: Literal["csv", "parquet"] = "csv",
+    form: TableForm = "csv",
     pixel_size: float | None = None,
 ) -> list[Path]:
     """Write results in a data format into a folder; return the files.
@@ -87,11 +133,7 @@ def draw_pictures(drawing: Drawing, out: Path | None, progress: Progress, *, fil
     from .recording.viewing.headless import NoPictureError
     from .recording.viewing.pictures import PictureSettings, timeline_values, write_film, write_pictures
 
-    recording, step = drawing.recording, drawing.step
-    if step < 1:
-        raise InputError("--step", str(step), "is not a positive number")
-    if not 0.0 < drawing.rate <= 120.0:
-        raise InputError("--rate", str(drawing.rate), "is not between 0 and 120 pictures a second")
+    recording = drawing.recording
     try:
         first, last = timeline_values(recording, drawing.timeline)
         begin, end = drawing.times or (0, None)
@@ -99,7 +141,7 @@ def draw_pictures(drawing: Drawing, out: Path | None, progress: Progress, *, fil
             given = f"{begin}:{'' if end is None else end}"
             raise InputError("--frames", given, f"is not a range of {first}:{last + 1} on the timeline "
                              f"{drawing.timeline}")  # fmt: skip
-        chosen = range(max(begin, first), last + 1 if end is None else end, step)
+        chosen = range(max(begin, first), last + 1 if end is None else end, drawing.step)
         shown = PictureSettings(drawing.timeline, drawing.tab, drawing.view, drawing.size)
 
         def report(done: int, total: int) -> None:
@@ -151,7 +193,7 @@ def draw_figure_frames(
     begin, end = drawing.times or (0, None)
     chosen = range(len(results.frames))[begin : end : drawing.step]
     frames = [k for k in chosen if results.frames[k].status is not FrameStatus.FAILED]
-    if not frames or drawing.step < 1:
+    if not frames:
         raise InputError("--frames", f"{begin}:{'' if end is None else end}", "names no frame with forces")
 
     def pictures() -> Iterator[bytes]:

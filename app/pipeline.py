@@ -38,9 +38,9 @@ from .results.hdf5.lazy_sequences import LazySequence
 from .results.hdf5.store import Provenance, load_results, load_tracks, origin_of, save_tracks
 from .results.results import Results, TruthContacts
 from .results.summary import save_summary, summarize
-from .results.truth import TRUTH_COLUMNS, read_truth, score, true_ids
+from .results.truth import TRUTH_COLUMNS, score
 from .run_folder import RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, Run, find_experiment
-from .run_truth import load_truth, refuse_unnamed_truth
+from .run_truth import check_truth, load_truth
 from .solver.parallel import available_cores
 from .tracking import DETECTIONS, PICTURES
 from .tracks import Tracks, WallTracks
@@ -78,17 +78,7 @@ def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
     for name, columns in ((experiment.config.truth, TRUTH_COLUMNS), (experiment.config.truth_tracks, POSE_COLUMNS)):
         if name is not None:
             experiment.table(name, columns)
-    if experiment.config.truth is not None:
-        refuse_unnamed_truth(run)
-    # Grains of photographs are named by truth_tracks where there is one, and not by their own ids.
-    named = experiment.config.photographs is not None and experiment.config.truth_tracks is not None
-    if experiment.config.truth is not None and ids is not None and not named:
-        file = experiment.folder / experiment.config.truth
-        poses, names = experiment.config.truth_tracks, walls.name if walls else ()
-        unseen = None if poses is None else true_ids(experiment.folder / poses)
-        read_truth(
-            file, ids, names, frame_count=count, unseen=unseen, inputs=experiment.inputs
-        )  # fmt: skip
+    check_truth(run, ids, None if walls is None else walls.name, count)
     return tracks, walls
 
 

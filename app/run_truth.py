@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from .experiment.config.experiment_file import ExperimentFile
@@ -13,7 +14,7 @@ from .experiment.experiment import load_experiment
 from .process.errors import InputError
 from .results.hdf5.store import load_results, origin_of
 from .results.results import Results, TruthContacts
-from .results.truth import names_in_table, names_of_given, read_truth, true_ids, true_names
+from .results.truth import TRUTH_COLUMNS, names_in_table, names_of_given, read_truth, true_ids, true_names
 from .run_folder import Run, find_experiment
 
 MOST_APART = 0.5  # of true forces whose grains are far apart: wrong ids in some photographs are left to the score
@@ -27,6 +28,41 @@ def truth_of(file: Path) -> TruthContacts | None:
     except InputError:
         return None
     return load_truth(Run(load_experiment(experiment), file.parent, origin.frames), load_results(file))
+
+
+def check_truth(run: Run, ids: NDArray[np.int64] | None, walls: tuple[str, ...] | None, frame_count: int) -> None:
+    """Check the true forces of an experiment, if there are any, before it is computed.
+
+    Without walls, contacts with walls are noted and ignored: grains can be tracked nevertheless.
+
+    Parameters
+    ----------
+    run
+        The run with its experiment.
+    ids
+        Ids of the grains (n,); None: they are not known yet.
+    walls
+        Names of the walls; None: there are neither walls nor another boundary.
+    frame_count
+        Number of frames of the experiment.
+
+    Raises
+    ------
+    InputError
+        A grain or wall is unknown.
+    """
+    experiment, config = run.experiment, run.experiment.config
+    if config.truth is None:
+        return
+    refuse_unnamed_truth(run)
+    # Grains of photographs are named by truth_tracks where there is one, and not by their own ids.
+    if ids is None or (config.photographs is not None and config.truth_tracks is not None):
+        return
+    unseen = None if config.truth_tracks is None else true_ids(experiment.folder / config.truth_tracks)
+    table = experiment.table(config.truth, TRUTH_COLUMNS)
+    if walls is None and not all(each.lstrip("-").isdecimal() for each in table.text("j")):
+        run.notes.append(f"{config.truth}: contacts with walls are ignored, since no walls are given.")
+    read_truth(table, ids, walls, frame_count=frame_count, unseen=unseen)
 
 
 def load_truth(run: Run, results: Results, file: Path | None = None) -> TruthContacts | None:

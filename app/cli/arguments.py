@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -89,6 +90,23 @@ def refuse_step(frames: FrameRange) -> tuple[int, int | None]:
     if frames.step != 1:
         raise InputError("--frames", str(frames), "has a step, which applies to run, track, solve and record only")
     return frames.start, frames.stop
+
+
+def refuse_unused(command: str, given: Mapping[str, object], when: str) -> None:
+    """Raise InputError for the first option that was given although it has no effect.
+
+    Parameters
+    ----------
+    command : str
+        The command.
+    given : mapping of str to object
+        Values by option; None, False and an empty tuple stand for an option that was not given.
+    when : str
+        When these options do not apply, such as "without --follow".
+    """
+    for option, value in given.items():
+        if value not in (None, False, ()):
+            raise InputError(command, option, f"does not apply {when}")
 
 
 def worker_count(workers: int | None) -> int:

@@ -108,7 +108,8 @@ def _file_instead_of_folder(error: OSError) -> str | None:
 
 def _describe(error: OSError) -> str:
     """Describe an operating system error in one line: the file and the reason."""
-    names = " -> ".join(str(name) for name in (error.filename, error.filename2) if name is not None)
+    given = dict.fromkeys(str(name) for name in (error.filename, error.filename2) if name is not None)
+    names = " -> ".join(given)
     reason = error.strerror or " ".join(str(error).split()) or type(error).__name__
     return f"{names}: {reason}" if names else reason
 

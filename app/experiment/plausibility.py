@@ -17,12 +17,11 @@ from ..solver.boundary.continuation import bearing_past_ends
 from ..solver.calibration.gaps import MeasuredSequence
 from ..tracks import Tracks, WallTracks
 from .boundary import free_surfaces
-from .config.corrections import DIGITS, SOLID_DENSITIES
+from .config.corrections import DIGITS, GREATEST_RADIUS, SOLID_DENSITIES, look_like_millimetres
 from .experiment import Experiment
 
 NEIGHBOURS = 8  # nearest centres of a grain, which include the one closest in units of radii
 SPACING = (0.93, 1.15)  # of neighbours over their radii, median: packed rods touch, whatever the noise
-GREATEST_RADIUS = 0.5  # [m] of a rod
 GREATEST_FRACTION = 2.0  # of the packing's diagonal: no radius is larger
 MISTAKE_TOLERANCE = 0.15  # relative difference between a spacing and that of a known mistake, at most
 HEAVIEST_IN_G_PER_CM3 = 1e-3 * SOLID_DENSITIES[1]
@@ -86,7 +85,7 @@ def check_radii(sources: PackingSources, tracks: Tracks) -> None:
     file, key = sources.radii
     middle = float(np.median(tracks.radius))
     if middle > GREATEST_RADIUS:
-        guess = "; they look like millimetres" if middle < 1e3 * GREATEST_RADIUS else ""
+        guess = "; they look like millimetres" if look_like_millimetres(middle) else ""
         raise InputError(file, key, f"makes the median radius {middle:g} m: lengths are in metres{guess}")
     if sources.precision is not None and np.nanmin(tracks.sigma) > middle:
         raise InputError(

@@ -15,8 +15,8 @@ APP = Path(__file__).parent.parent
 SOLVER = Path(str(solver.__file__)).parent
 # Errors that end a command; the arguments before the last two are the file and the place in it.
 ERRORS = {
-    "InputError", "RunError", "NoPictureError", "DifferentPackingError", "FrictionError", "CoordinationError",
-    "UnbalancedError", "UnreadableError",
+    "InputError", "MissingFileError", "MissingFrameError", "FigureError", "RunError", "NoPictureError",
+    "DifferentPackingError", "FrictionError", "CoordinationError", "UnbalancedError", "UnreadableError",
 }  # fmt: skip
 ERROR_METHODS = ("error", "_error")  # they make an InputError of their last argument, a problem
 VALIDATED = "experiment/config/"  # folder where a ValueError reports a wrong key

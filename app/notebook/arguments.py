@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Iterable, Mapping, Sequence
-from numbers import Real
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ import tomli_w
 
 from ..experiment.reading.tables import Table
 from ..process.errors import InputError
+from ..process.frame_range import FrameRange
 
 OPTIONAL = "theta"  # column whose values may be NaN
 WHOLE = ("frame", "id")  # columns of whole numbers, which data frames may store as floats
@@ -53,6 +54,16 @@ def as_whole(name: str, value: object) -> int:
         return operator.index(value)  # type: ignore[arg-type]
     except TypeError:
         raise InputError(name, repr(value), "is not a whole number") from None
+
+
+def as_frames(frames: object) -> FrameRange:
+    """Return a range of frames. Raises InputError for what is none."""
+    if isinstance(frames, Sequence) and len(frames) in (2, 3) and not isinstance(frames, str):
+        first, stop, step = (*frames, 1)[:3]
+        whole = [each for each in (first, 0 if stop is None else stop, step) if isinstance(each, Integral)]
+        if len(whole) == 3 and step >= 1:
+            return FrameRange(int(first), None if stop is None else int(stop), int(step))
+    raise InputError("frames", repr(frames), "is not (first, end) or (first, end, step), such as (0, None, 4)")
 
 
 def as_frame(name: str, columns: object) -> pd.DataFrame:

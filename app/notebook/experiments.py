@@ -15,12 +15,11 @@ from .. import pipeline
 from ..experiment.config.unused_keys import refuse_unused_keys
 from ..experiment.experiment import load_experiment
 from ..process.errors import InputError
-from ..process.frame_range import FrameRange
 from ..process.progress import Progress
 from ..run_folder import Run as RunFolder
 from ..run_folder import hold_run
 from ..tracks import Tracks, TrackStatus
-from .arguments import as_strings
+from .arguments import as_frames, as_strings, is_number
 from .made_runs import run
 from .run import Run
 from .shown_progress import shown_progress
@@ -100,7 +99,7 @@ def init(folder: str | PathLike[str], photographs: str, **options: Unpack[InitOp
         raise InputError("init", unknown[0], f"is not an option: there are {', '.join(InitOptions.__annotations__)}")
     given: dict[str, Any] = dict(options)
     if "frames" in given:
-        given["frames"] = FrameRange(*given["frames"])
+        given["frames"] = as_frames(given["frames"])
     given |= {name: Path(given[name]) for name in ("lens", "grains") if name in given}
     found = initialise(place, SetupFlags(photographs, **given))
     rows = [
@@ -203,7 +202,7 @@ def track(
     loaded = load_experiment(Path(experiment), as_strings(settings or {}))
     if report and loaded.config.photographs is None:
         raise InputError(loaded.file, "report", "needs photographs, but these tracks come from a table")
-    folder = RunFolder(loaded, _folder(out, loaded.name), FrameRange(*frames), progress or shown_progress())
+    folder = RunFolder(loaded, _folder(out, loaded.name), as_frames(frames), progress or shown_progress())
     with hold_run(folder):
         tracks, walls = pipeline.track(folder)
         if report:
@@ -256,7 +255,7 @@ def follow(
     """
     from ..following.follow import follow as follow_photographs
 
-    if idle is not None and not (np.isfinite(idle) and idle > 0.0):
+    if idle is not None and not (is_number(idle) and idle > 0.0):
         raise InputError("idle", str(idle), "is not a positive number of seconds")
     texts, watched = as_strings(settings or {}), progress or shown_progress()
     loaded = load_experiment(Path(experiment), texts)

@@ -11,14 +11,24 @@ from typing import Any, Literal, TypedDict, Unpack, get_args
 import pandas as pd
 
 from ..exchange.foreign.format_names import FileFormat
-from ..exported_files import Drawing, ExportKind, draw_pictures, write_data, write_run_figures
-from ..process.errors import InputError
+from ..exported_files import (
+    Drawing,
+    ExportKind,
+    TableForm,
+    Timeline,
+    check_options,
+    draw_pictures,
+    write_data,
+    write_run_figures,
+)
+from ..process.errors import InputError, naming
 from ..run_folder import RECORDING
 from .comparisons import Source, as_run
 from .shown_progress import shown_progress
 
 DRAWN = ("pictures", "video")
 FIGURES = "figures"
+DATA_FRAME = "data frame"  # its name in messages
 
 
 class ImportOptions(TypedDict, total=False):
@@ -40,10 +50,10 @@ class ImportOptions(TypedDict, total=False):
 class ExportOptions(TypedDict, total=False):
     """Options of `rodsight export`, each for some kinds."""
 
-    kind: Literal["csv", "parquet"]
+    kind: TableForm
     pixel_size: float
     frames: tuple[int, int | None]
-    timeline: Literal["frame", "sweep"]
+    timeline: Timeline
     step: int
     tab: str
     view: str
@@ -113,10 +123,11 @@ def import_table(
     if "pairs" in others:
         others["pairs"] = Path(others["pairs"])
     with tempfile.TemporaryDirectory(prefix="rodsight-") as place:
-        file = Path(place) / "data_frame.csv" if isinstance(source, pd.DataFrame) else Path(source)
+        file = Path(place) / DATA_FRAME if isinstance(source, pd.DataFrame) else Path(source)
         if isinstance(source, pd.DataFrame):
             source.to_csv(file, index=False)
-        imported, _ = import_files(ImportRequest(form, file, columns or {}, **others), Path(folder))
+        with naming(Path(place) / DATA_FRAME, DATA_FRAME):
+            imported, _ = import_files(ImportRequest(form, file, columns or {}, **others), Path(folder))
     tracks = imported.tracks
     frame, grain = tracks.present.nonzero()
     table = pd.DataFrame(
@@ -171,6 +182,10 @@ def export(
     for name in options:
         if name not in ExportOptions.__annotations__:
             raise InputError("export", name, f"is not an option: there are {', '.join(ExportOptions.__annotations__)}")
+    formats = options.get("formats")
+    if isinstance(formats, str):  # one format, against the type
+        options["formats"] = (formats,)  # type: ignore[typeddict-item]
+    check_options(what, options)
     target = None if out is None else Path(out)
     if run.file is None and (target is None or what in (*DRAWN, FIGURES)):
         raise InputError("export", what, "needs a run with a folder, or for data the argument out")

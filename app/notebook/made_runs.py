@@ -11,12 +11,13 @@ from pathlib import Path
 from .. import pipeline
 from ..experiment.config.unused_keys import refuse_unused_keys
 from ..experiment.experiment import load_experiment
-from ..process.frame_range import ALL_FRAMES, FrameRange
+from ..process.errors import MissingFileError
+from ..process.frame_range import ALL_FRAMES
 from ..process.progress import Progress
 from ..run_folder import RESULTS, hold_run
 from ..run_folder import Run as RunFolder
 from ..run_truth import load_truth
-from .arguments import as_strings
+from .arguments import as_frames, as_strings
 from .run import Run
 from .shown_progress import shown_progress
 
@@ -63,9 +64,7 @@ def run(
     loaded = load_experiment(Path(experiment), as_strings(settings or {}))
     refuse_unused_keys(loaded.config, loaded.file)
     folder = Path(out) if out is not None else Path("runs") / loaded.name
-    folder_of_run = RunFolder(
-        loaded, folder, FrameRange(frames[0], frames[1], *frames[2:]), progress or shown_progress()
-    )
+    folder_of_run = RunFolder(loaded, folder, as_frames(frames), progress or shown_progress())
     with hold_run(folder_of_run):
         results = pipeline.solve(folder_of_run)
         truth = load_truth(folder_of_run, results)
@@ -86,8 +85,8 @@ def open_run(path: str | PathLike[str]) -> Run:
 
     Raises
     ------
-    FileNotFoundError
-        If there are no results.
+    InputError
+        If there are no results; it is a FileNotFoundError as well.
 
     Examples
     --------
@@ -95,11 +94,11 @@ def open_run(path: str | PathLike[str]) -> Run:
     <rodsight.Run 'my_test': 40 grains, 5 frames>
     >>> rodsight.open("runs/nothing")
     Traceback (most recent call last):
-    FileNotFoundError: runs/nothing: there are no results
+    rodsight.process.errors.MissingFileError: runs/nothing: there are no results
     """
     file = Path(path) / RESULTS if Path(path).is_dir() else Path(path)
     if not file.is_file():
-        raise FileNotFoundError(f"{file}: there are no results")
+        raise MissingFileError(file, "", "there are no results")
     found = Run(file)
     if found.out_of_date:
         warnings.warn(f"{file} is out of date: {'; '.join(found.out_of_date)}; run the experiment again", stacklevel=2)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import pandas as pd
 
 from ..exchange.tidy_tables import TableName, make_table
 from ..out_of_date import state_of_source
+from ..process.errors import FigureError, InputError, MissingFileError, MissingFrameError
 from ..results.hdf5.store import load_results
 from ..results.results import Results
 from ..results.summary import summarize
@@ -83,8 +84,8 @@ class Run:
 
         Raises
         ------
-        IndexError
-            If there is no such frame.
+        InputError
+            If there is no such frame; it is an IndexError as well.
 
         Examples
         --------
@@ -123,8 +124,8 @@ class Run:
 
         Raises
         ------
-        IndexError
-            If there is no such frame.
+        InputError
+            If there is no such frame; it is an IndexError as well.
 
         Examples
         --------
@@ -208,10 +209,9 @@ class Run:
 
         Raises
         ------
-        IndexError
-            If there is no such frame.
         InputError
-            If networkx is not installed (`pip install 'rodsight[graph]'`).
+            If there is no such frame, which is an IndexError as well, or networkx is not installed (`pip install
+            'rodsight[graph]'`).
 
         Examples
         --------
@@ -235,12 +235,14 @@ class Run:
 
         Raises
         ------
-        FileNotFoundError
-            If the run has no recording, such as one of `rodsight.solve`.
+        InputError
+            If the run has no recording, such as one of `rodsight.solve`; it is a FileNotFoundError as well.
         """
         file = None if self.file is None else self.file.with_name(RECORDING)
         if file is None or not file.is_file():
-            raise FileNotFoundError("there is no recording of this run: rodsight.run and `rodsight record` write one")
+            raise MissingFileError(
+                "", "", "there is no recording of this run: rodsight.run and `rodsight record` write one"
+            )
         return show_recording(file)
 
     def figure(
@@ -262,22 +264,29 @@ class Run:
 
         Raises
         ------
-        ValueError
-            If the figure is unknown or has no data.
-        IndexError
-            If there is no such frame.
+        InputError
+            If the figure is unknown or has no data, which is a ValueError as well, or there is no such frame, which is
+            an IndexError as well.
 
         Examples
         --------
         >>> rodsight.open("runs/shear").figure("forces", frame=3).savefig("forces.pdf")
         """
+        from ..figures.figure_style import Width
         from ..figures.gallery import NEED_TRUTH, draw_figure
 
         needs_truth = name in NEED_TRUTH and against is None
         truth = truth_of(self._source) if needs_truth and isinstance(self._source, Path) else None
+        if against is not None and not isinstance(against, Run):
+            raise InputError("figure", f"against = {against!r}", "is not a run: open it by rodsight.open")
         other = None if against is None else against.results
         number = None if frame is None else self.checked_frame(frame)
-        return draw_figure(self.results, name, number, width=width, truth=truth, against=other)
+        if width not in get_args(Width):
+            raise InputError("figure", f"width = {width!r}", f"is not one of {', '.join(get_args(Width))}")
+        try:
+            return draw_figure(self.results, name, number, width=width, truth=truth, against=other)
+        except ValueError as error:
+            raise FigureError("figure", repr(name), str(error)) from None
 
     def __repr__(self) -> str:
         tracks = self.results.tracks
@@ -285,17 +294,17 @@ class Run:
         return f"<rodsight.Run {self.name!r}: {tracks.grain_count} grains, {tracks.frame_count} frames{state}>"
 
     def checked_frame(self, frame: int) -> int:
-        """Return the frame. Raises IndexError if there is no such frame, and InputError for what is no frame's number.
+        """Return the frame. Raises InputError, which is an IndexError as well if there is no such frame.
 
         Examples
         --------
         >>> rodsight.open("runs/shear").checked_frame(7)
         Traceback (most recent call last):
-        IndexError: there is no frame 7: frames go from 0 to 4
+        rodsight.process.errors.MissingFrameError: there is no frame 7: frames go from 0 to 4
         """
         number, count = as_whole("frame", frame), self.results.tracks.frame_count
         if not 0 <= number < count:
-            raise IndexError(f"there is no frame {number}: frames go from 0 to {count - 1}")
+            raise MissingFrameError("", "", f"there is no frame {number}: frames go from 0 to {count - 1}")
         return number
 
     @cached_property

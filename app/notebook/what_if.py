@@ -74,11 +74,9 @@ def what_if(
 
     Raises
     ------
-    IndexError
-        If there is no such frame.
     InputError
-        A body is unknown, a forbidden contact does not exist or contacts are forced (local), or the input of the run
-        changed on the disk.
+        There is no such frame (an IndexError as well), a body is unknown, a forbidden contact does not exist or
+        contacts are forced (local), or the input of the run changed on the disk.
 
     Examples
     --------

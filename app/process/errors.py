@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -15,6 +17,29 @@ class InputError(Exception):
         text = ": ".join(part for part in (str(file), where, problem) if part)
         super().__init__(" ".join(text.split()))
         self.problem = problem  # without the file and the place in it
+
+
+class MissingFileError(InputError, FileNotFoundError):
+    """A file or folder that the input names does not exist."""
+
+
+class MissingFrameError(InputError, IndexError):
+    """The input names a frame that does not exist."""
+
+
+class FigureError(InputError, ValueError):
+    """The input requests a figure that does not exist, or for which there are no data."""
+
+
+@contextmanager
+def naming(file: Path, name: str) -> Iterator[None]:
+    """Name a temporary file in bad input of the block as what the user gave: a data frame, a folder to be made."""
+    try:
+        yield
+    except InputError as error:
+        error.args = (str(error).replace(str(file), name),)
+        error.problem = error.problem.replace(str(file), name)
+        raise
 
 
 class RunError(Exception):

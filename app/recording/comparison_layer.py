@@ -7,7 +7,6 @@ where the second is.
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from ..drawing.accumulated_strain import accumulated_strains
 from ..drawing.force_range import ForceRange
 from ..experiment.units import Scale
+from ..process.atomic import replacing
 from ..results.comparison import Comparison, FieldFrame
 from ..solver.bodies.grains import Array
 from ..solver.contacts.pairs import align
@@ -57,24 +57,19 @@ def record_comparison(comparison: Comparison, path: Path | str, *, scale: Scale 
         f"{comparison.first.name} and {comparison.second.name}", tracks, base.walls, base.grains, base.friction,
         base.configuration, canvas, ForceStyle.on(canvas, _range_of(comparison)),
     )  # fmt: skip
-    part = path.with_name(path.name + ".part")
     rr.set_strict_mode(True)
     stream = rr.RecordingStream(APPLICATION_ID)
-    try:
-        with writing(stream, part, make_comparison_blueprint(comparison, canvas)):
-            stream.set_log_time_enabled(False)
-            stream.send_recording_name(printable(scene.name))
-            axes = _log_styles(stream, scene, comparison)
-            strains = accumulated_strains([forces.strain for forces in base.frames])
-            for frame, strain in enumerate(strains):
-                clock = Clock(stream, frame, frame, frame, float(base.tracks.time[frame]), strain)
-                _log_frame(clock, scene, comparison, axes)
-            stream.reset_time()
-            text = rr.TextDocument(printable(describe(comparison)), media_type=rr.MediaType.MARKDOWN)
-            stream.log(SUMMARY, text, static=True)
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
+    with replacing(path) as part, writing(stream, part, make_comparison_blueprint(comparison, canvas)):
+        stream.set_log_time_enabled(False)
+        stream.send_recording_name(printable(scene.name))
+        axes = _log_styles(stream, scene, comparison)
+        strains = accumulated_strains([forces.strain for forces in base.frames])
+        for frame, strain in enumerate(strains):
+            clock = Clock(stream, frame, frame, frame, float(base.tracks.time[frame]), strain)
+            _log_frame(clock, scene, comparison, axes)
+        stream.reset_time()
+        text = rr.TextDocument(printable(describe(comparison)), media_type=rr.MediaType.MARKDOWN)
+        stream.log(SUMMARY, text, static=True)
     return path.stat().st_size
 
 

@@ -27,7 +27,7 @@ CLOSE = 0.5  # radii: largest distance between a grain and its true position
 def read_truth(
     file: Path | Table,
     ids: NDArray[np.int64],
-    walls: tuple[str, ...],
+    walls: tuple[str, ...] | None,
     *,
     frame_count: int,
     frames: FrameRange = ALL_FRAMES,
@@ -46,7 +46,7 @@ def read_truth(
         Id of every grain in the truth (n,), or in every frame of the truth (f, n); negative for grains that the truth
         does not have.
     walls
-        Names of the walls.
+        Names of the walls; None: there are neither walls nor another boundary, and contacts with walls are ignored.
     frame_count
         Number of frames to read.
     frames
@@ -64,7 +64,8 @@ def read_truth(
     table = file if isinstance(file, Table) else read_table(file, TRUTH_COLUMNS, inputs)
     number, i = table.integers("frame") - frames.start, table.integers("i")
     frame = np.where(number % frames.step == 0, number // frames.step, -1)
-    wall = {name: ids.shape[-1] + row for row, name in enumerate(walls)}
+    wall = {name: ids.shape[-1] + row for row, name in enumerate(walls or ())}
+    at_wall = np.zeros(len(table), np.bool_)  # of an experiment without walls
     bodies = [{int(each): row for row, each in enumerate(names) if each >= 0} for names in np.atleast_2d(ids)]
     body_at = [bodies[k if 0 <= k < len(bodies) else 0] for k in frame.tolist()]
     pair = np.empty((len(table), 2), np.int64)
@@ -75,11 +76,15 @@ def read_truth(
             try:
                 found = body_at[row].get(int(text), -1)
             except ValueError:
-                raise table.error(row, "j", "is neither a grain's id nor the name of a wall") from None
+                at_wall[row], found = walls is None, -1
+                if walls is not None:
+                    given = "" if walls else ": no walls are given"
+                    problem = f"is neither a grain's id nor the name of a wall{given}"
+                    raise table.error(row, "j", problem) from None
         pair[row, 1] = found
     if not np.any(ids < 0):  # every grain has an id in the truth, so that an unknown id is a mistake
         for column, values in (("i", pair[:, 0]), ("j", pair[:, 1])):
-            unknown = np.flatnonzero(values < 0)
+            unknown = np.flatnonzero((values < 0) & ~(at_wall & (column == "j")))
             if unseen is not None:
                 known_unseen = set(unseen.tolist())
                 unknown = unknown[[int(table.text(column)[row]) not in known_unseen for row in unknown]]

@@ -8,35 +8,24 @@ from typing import Annotated, Literal
 import tyro
 from rich.console import Console
 
+from ...exported_files import ExportKind, TableForm, Timeline, check_options
 from ...process.errors import InputError
-from ..arguments import Frames, Quiet, parse_frames, refuse_step
+from ..arguments import Frames, Quiet, parse_frames, refuse_step, refuse_unused
 from ..stored_results import recording_file, results_file, warn_out_of_date
 from ..terminal import print_line, progress_of
 
-Kind = Literal["pictures", "video", "figures", "tables", "vtk", "ovito", "graph", "dic"]
-# Kinds to which each option applies; --out and --quiet apply to all.
-KINDS_OF_OPTION: dict[str, tuple[Kind, ...]] = {
-    "--kind": ("tables",),
-    **dict.fromkeys(
-        ("--frames", "--timeline", "--step", "--tab", "--view", "--size", "--figure"), ("pictures", "video")
-    ),
-    "--rate": ("video",),
-    "--pixel-size": ("dic",),
-    **dict.fromkeys(("--frame", "--formats", "--width", "--set"), ("figures",)),
-}
-
 
 def export(
-    what: Annotated[Kind, tyro.conf.Positional, tyro.conf.arg(help="to write")],
+    what: Annotated[ExportKind, tyro.conf.Positional, tyro.conf.arg(help="to write")],
     source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RESULTS", help="a run's folder or file")],
     /,
     out: Annotated[
         Path | None, tyro.conf.arg(metavar="PATH", help="folder, or file of a video; default: beside the results")
     ] = None,
-    kind: Annotated[Literal["csv", "parquet"] | None, tyro.conf.arg(help="tables: format; default csv")] = None,
+    kind: Annotated[TableForm | None, tyro.conf.arg(help="tables: format; default csv")] = None,
     frames: Annotated[str | None, tyro.conf.arg(metavar="A:B", help="pictures, video: of the timeline")] = None,
     timeline: Annotated[
-        Literal["frame", "sweep"] | None, tyro.conf.arg(help="pictures, video: from picture to picture; default frame")
+        Timeline | None, tyro.conf.arg(help="pictures, video: from picture to picture; default frame")
     ] = None,
     step: Annotated[int | None, tyro.conf.arg(help="pictures, video: every so many values; default 1")] = None,
     tab: Annotated[str | None, tyro.conf.arg(help="pictures, video: the tab to show; default Forces")] = None,
@@ -89,7 +78,9 @@ def export(
     from ...exported_files import Drawing, draw_figure_frames, draw_pictures, write_data, write_run_figures
     from ...results.hdf5.store import load_results
 
-    _refuse_other_options(what, given)
+    check_options(what, given)
+    if figure is not None:
+        refuse_unused("export", {"--timeline": timeline, "--tab": tab, "--view": view}, "with --figure")
     console = Console(quiet=quiet)
     warn_out_of_date(source)
     folder = source if source.is_dir() else source.parent
@@ -152,6 +143,8 @@ def share(
     if (source is None) == (repair is None):
         raise InputError("share", "", "give either a run's folder or recording, or --repair FILE")
     if repair is not None:
+        given = {"--frames": frames, "--scale": scale != 1.0, "--html": html}
+        refuse_unused("share", given | {"--although-out-of-date": although_out_of_date}, "with --repair")
         return _repair(repair, out, console)
     assert source is not None
     recording = recording_file(source)
@@ -177,12 +170,6 @@ def refuse_out_of_date(recording: Path) -> None:
         )
 
 
-def _refuse_other_options(what: Kind, given: dict[str, object]) -> None:
-    for option, kinds in KINDS_OF_OPTION.items():
-        if given[option] is not None and what not in kinds:
-            raise InputError("export", f"{option} with {what}", f"applies to {' and '.join(kinds)} only")
-
-
 def _name_files(target: Path, files: list[Path]) -> str:
     names = ", ".join(file.name for file in files[:3]) + (f" … {files[-1].name}" if len(files) > 3 else "")
     return f"{target}/: {names}."
@@ -190,8 +177,8 @@ def _name_files(target: Path, files: list[Path]) -> str:
 
 def _window(text: str) -> tuple[int, int]:
     width, _, height = text.partition("x")
-    if not (width.isdigit() and height.isdigit() and 100 <= int(width) <= 8192 and 100 <= int(height) <= 8192):
-        raise InputError("--size", text, "is not WIDTHxHEIGHT in pixels from 100 to 8192")
+    if not (width.isdigit() and height.isdigit()):
+        raise InputError("--size", text, "is not WIDTHxHEIGHT in pixels, such as 1600x1000")
     return int(width), int(height)
 
 

@@ -31,6 +31,7 @@ from ..arguments import (
     Sweeps,
     Threads,
     parse_frames,
+    refuse_unused,
     worker_count,
 )
 from ..terminal import Form, print_line, progress_of
@@ -107,6 +108,7 @@ def run(
     request = request.with_setting("solver.workers", threads).with_setting("tracking.workers", threads)
     console = request.console
     began = time.perf_counter()
+    refuse_unused("run", {} if follow else {"--idle": idle}, "without --follow")
     if follow:
         _follow(request, idle)
     with open_run(request) as plain:

@@ -7,7 +7,18 @@ from typing import Annotated, Literal
 
 import tyro
 
-from ..arguments import AsJson, ExperimentPath, Frames, Out, Quiet, Scheduler, Settings, Workers, worker_count
+from ..arguments import (
+    AsJson,
+    ExperimentPath,
+    Frames,
+    Out,
+    Quiet,
+    Scheduler,
+    Settings,
+    Workers,
+    refuse_unused,
+    worker_count,
+)
 from ..terminal import table_console
 from .run import Request, open_run
 
@@ -52,6 +63,9 @@ def sensitivity(
     from ...robustness import study as runs
     from ...robustness.execution import reach_scheduler
 
+    if budget:
+        given = {"--design": design == "sobol", "--factors": factors, "--samples": samples, "--seed": seed or None}
+        refuse_unused("sensitivity", given | {"--scheduler": scheduler}, "with --budget")
     processes = worker_count(workers)
     console = table_console(report.WIDTH, quiet=quiet)
     request = Request(experiment, settings, quiet, out, frames)

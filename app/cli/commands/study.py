@@ -112,7 +112,7 @@ def study(
         Literal["authors"] | None,
         tyro.conf.arg(
             help="paper: score the recipe of the authors' own program beside the paper's and this one, on PATH or on "
-            "the apparatus of the preset 1g2e with radii 2 %% too small"
+            "the apparatus of the preset 1g2e with radii 2 % too small"
         ),
     ] = None,
     quiet: Quiet = False,

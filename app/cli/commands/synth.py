@@ -51,7 +51,7 @@ def synth(
     pixel_size: Annotated[float | None, tyro.conf.arg(help="side of a pixel [m]")] = None,
     reversal: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="reverse the shear half way")] = False,
     radius_error: Annotated[
-        float, tyro.conf.arg(help="error that all stated radii share, as a fraction: -0.02 states them 2 %% too small")
+        float, tyro.conf.arg(help="error that all stated radii share, as a fraction: -0.02 states them 2 % too small")
     ] = 0.0,
     quiet: Quiet = False,
 ) -> int:

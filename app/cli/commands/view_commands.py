@@ -14,7 +14,7 @@ from rich.table import Table
 
 from ...process.errors import InputError
 from ...process.machine.browser import open_page
-from ..arguments import AsJson, Browser, Port, ResultsPath
+from ..arguments import AsJson, Browser, Port, ResultsPath, refuse_unused
 from ..stored_results import has_experiment, load_run, recording_file, results_file, warn_out_of_date
 from ..terminal import print_line, table_console
 
@@ -96,6 +96,10 @@ def review(
     """
     from ...reviewing import verdict_tables
 
+    if import_csv is None:
+        refuse_unused("review", {"--complete": complete}, "without --import-csv")
+    elif export_csv is not None:
+        raise InputError("review", "--export-csv", "does not apply with --import-csv: give them one after the other")
     if import_csv is not None:
         return verdict_tables.import_table(experiment, import_csv, reviewer=reviewer, complete=complete)
     if export_csv is not None:

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ...experiment.config.experiment_file import find_config_errors, load_config
 from ...experiment.experiment import CELL_COLUMNS, CONFIG_NAME
 from ...experiment.reading.corners import FrameCorners, bars_of_corners
 from ...experiment.reading.tables import write_table
 from ...process.atomic import replacing_folder
-from ...process.errors import InputError
+from ...process.errors import InputError, naming
 from ...solver.bodies.grains import Array
 from .imported_corners import CornerDiscs
 from .observations import ImportedTracks
@@ -54,10 +55,23 @@ def write_folder(folder: Path, imported: ImportedTracks, contents: FolderContent
                 raise InputError(option, wall, f"is not a wall ({existing})")
     for wall in contents.load.keys() & contents.pressure.keys():
         raise InputError("--load", wall, "has a pressure, too: give one of them")
-    with replacing_folder(folder) as part:
+    if contents.load and not contents.pressure and not any(contents.load.values()):
+        raise InputError("--load", ", ".join(contents.load), "is 0 N alone: the scale of the forces is undetermined")
+    _refuse_pressures(contents.pressure)
+    with replacing_folder(folder) as part, naming(part, str(folder)):
         _write_files(part, imported, contents)
         description = _describe(folder, imported, contents, source)
         (part / CONFIG_NAME).write_text(description, encoding="utf-8")
+        load_config(part / CONFIG_NAME)
+
+
+def _refuse_pressures(pressure: Mapping[str, float]) -> None:
+    """Raise InputError for a pressure that the key [walls.NAME] pressure does not take."""
+    for wall, value in pressure.items():
+        walls = {"file": "walls.csv", wall: {"pressure": value}}
+        for key, error in find_config_errors(Path(CONFIG_NAME), {"walls": walls}):
+            if key == f"walls.{wall}.pressure":
+                raise InputError("--pressure", wall, error.problem)
 
 
 def _write_files(folder: Path, imported: ImportedTracks, contents: FolderContents) -> None:

@@ -20,7 +20,7 @@ MAX_LISTED = 12  # column names in a message
 
 
 def read_foreign(file: Path, columns: Sequence[str], optional: Sequence[str] = ()) -> Table:
-    """Read the named columns of a table; a file without a header has columns 1, 2, 3, …
+    """Read the named columns of a table; a number that is no name denotes the column at this place, from 1.
 
     Parameters
     ----------
@@ -41,13 +41,14 @@ def read_foreign(file: Path, columns: Sequence[str], optional: Sequence[str] = (
         Naming file, row and value.
     """
     header, rows = _open(file)
-    wanted = [*columns, *(name for name in optional if name in header)]
+    place = {name: _place(header, name) for name in (*columns, *optional)}
+    wanted = [*columns, *(name for name in optional if place[name] is not None)]
     for name in wanted:
-        if header.count(name) != 1:
+        if place[name] is None or header.count(name) > 1:
             listed = ", ".join(header[:MAX_LISTED]) + (" …" if len(header) > MAX_LISTED else "")
-            problem = "there is no such column" if name not in header else "is twice in the header"
+            problem = "there is no such column" if place[name] is None else "is twice in the header"
             raise InputError(file, f"column {name}", f"{problem} (columns: {listed})")
-    position = [header.index(name) for name in wanted]
+    position = [at for name in wanted if (at := place[name]) is not None]
     values: dict[str, list[str]] = {name: [] for name in wanted}
     line = []
     for number, cells in rows:
@@ -63,6 +64,13 @@ def read_foreign(file: Path, columns: Sequence[str], optional: Sequence[str] = (
     for name in wanted:
         _convert_decimal_commas(table, name, values)
     return table
+
+
+def _place(header: Sequence[str], name: str) -> int | None:
+    """Return the index of a column that is given by its name, or by its number from 1 where no column has that name."""
+    if name in header:
+        return header.index(name)
+    return int(name) - 1 if name.isdecimal() and 1 <= int(name) <= len(header) else None
 
 
 def column_names(file: Path) -> list[str]:

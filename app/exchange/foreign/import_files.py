@@ -6,9 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
+from ...experiment.plausibility import PackingSources, check_radii
 from ...process.errors import InputError
 from .experiment_folder import FolderContents, refuse_existing, write_folder
 from .file_formats import ImportedData, read_format
@@ -45,9 +47,11 @@ class ImportRequest:
     pairs: Path | None = None  # pair forces of a simulation [N], as truth
 
     def __post_init__(self) -> None:
+        if self.form not in get_args(FileFormat):
+            raise InputError("import", repr(self.form), f"is not a form: there are {', '.join(get_args(FileFormat))}")
         for name in ("pixel_size", "interval", "precision", "height", "radius", "corner_radius"):
             value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value > 0.0):
+            if value is not None and not (isinstance(value, int | float) and math.isfinite(value) and value > 0.0):
                 raise InputError(f"--{name.replace('_', '-')}", str(value), "is not positive")
 
 
@@ -71,7 +75,10 @@ def import_files(request: ImportRequest, folder: Path) -> tuple[ImportedTracks, 
         raise InputError("--corner-radius", str(request.corner_radius), f"does not apply: {reason}")
     height = None if request.height is None else request.height - 1.0
     convention = replace(foreign.convention, y_down=foreign.convention.y_down or request.y_down, height=height)
-    imported = make_tracks(foreign.observed, convention, foreign.precision_of(request.precision))
+    precision = foreign.precision_of(request.precision)
+    imported = make_tracks(foreign.observed, convention, precision)
+    stated = None if request.precision is None else ("--precision", f"{precision:g} m")
+    check_radii(PackingSources((request.source, _origin_of_radii(request)), stated, {}), imported.tracks)
     discs = None if corners is None else make_corners(corners, imported, convention, request.corner_radius)
     contents = replace(_folder_contents(request, foreign, imported, convention), corners=discs)
     if foreign.truth is not None:
@@ -87,6 +94,14 @@ def import_files(request: ImportRequest, folder: Path) -> tuple[ImportedTracks, 
         imported = replace(imported, remarks=(*imported.remarks, *remarks))
     write_folder(folder, imported, contents, f"From {request.source.name}, by rodsight import {request.form}.")
     return imported, contents
+
+
+def _origin_of_radii(request: ImportRequest) -> str:
+    """Return the column or the option that gives the radii, for messages."""
+    column = request.columns.get("radius") or request.columns.get("diameter")
+    if column is not None:
+        return f"column {column}"
+    return "column radius" if request.radius is None else "--radius"
 
 
 def _times_of(observed: Observations) -> list[float]:

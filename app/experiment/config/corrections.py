@@ -21,8 +21,9 @@ FACTORS = {
 }  # fmt: skip
 _NUMBER = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s.,].*)?")
 _LINE = re.compile(r"at line (\d+)")
-_ASSIGNMENT = re.compile(r"\s*([\w.-]+)\s*=\s*([^#]*?)\s*(?:#.*)?")
+_ASSIGNMENT = re.compile(r"\s*([\w.-]+)\s*[:=]*=[=\s]*([^#]*?)\s*(?:#.*)?")
 SOLID_DENSITIES = (10.0, 2.3e4)  # [kg/m³] the lightest foams for packaging; osmium has 22 590
+GREATEST_RADIUS = 0.5  # [m] of a rod
 DENSITIES_IN_OTHER_UNITS = (1e3, 1e-3)  # g/cm³ and g/m³, as factors to kg/m³
 MIN_SIMILARITY = 0.7  # of a word that the user may have meant
 DIGITS = 12  # of a converted number
@@ -40,6 +41,11 @@ def read_quantity(text: str, unit: str) -> float | None:
     factors = FACTORS.get(unit, {})
     factor = factors.get(plain if unit == "m" else plain.lower())
     return None if factor is None else float(f"{number * factor:.{DIGITS}g}")
+
+
+def look_like_millimetres(radius: float) -> bool:
+    """Whether a radius, which should be in metres, is larger than that of any rod, and plausible in millimetres."""
+    return GREATEST_RADIUS < radius < 1e3 * GREATEST_RADIUS
 
 
 def correct_value(name: str, value: Any, kind: str, unit: str) -> str | None:
@@ -127,9 +133,13 @@ def _correct_line(lines: list[str], row: int, line: str, error: str, unit_of: Ca
         return f"write {apart[1]} = {apart[2]}" if apart and _is_toml(f"{apart[1]} = {apart[2]}") else _plain(error)
     name, value = split.groups()
     section = next((each.strip().strip("[]") for each in reversed(lines[: row - 1]) if each.strip()[:1] == "["), "")
-    number = read_quantity(value, unit_of(f"{section}.{name}".strip(".")))
-    for right in ([] if number is None else [f"{name} = {number!r}"]) + [f'{name} = "{value}"']:
-        if value and '"' not in value and "'" not in value and value[:1] not in "[{" and _is_toml(right):
+    unit = unit_of(f"{section}.{name}".strip("."))
+    number = read_quantity(value, unit)
+    lines_to_write = [f"{name} = {value}", *([] if number is None else [f"{name} = {number!r}"])]
+    if not unit and value[:1] not in "[{" and not set("\"'=") & set(value):  # a quantity with a unit is no text
+        lines_to_write.append(f'{name} = "{value}"')
+    for right in lines_to_write if value else ():
+        if right != line and _is_toml(right):
             return f"write {right}"
     return _plain(error)
 

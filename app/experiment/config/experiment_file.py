@@ -104,7 +104,7 @@ def _validated(kind: type[S], file: Path | str, data: dict[str, Any], settings: 
     try:
         return kind.model_validate(data)
     except ValidationError as error:
-        raise _explain(file, error) from None
+        raise _explain(file, error, kind) from None
 
 
 def _refuse_nul(file: Path | str, value: Any, name: str) -> None:
@@ -170,14 +170,23 @@ def _first_word(error: InputError) -> str:
     return error.problem.partition(" ")[0]
 
 
-def _explain(file: Path | str, error: ValidationError) -> InputError:
+def _explain(file: Path | str, error: ValidationError, kind: type[Section]) -> InputError:
     errors = error.errors()
     misspelt = (each for each in errors if each["type"] == "extra_forbidden")  # why another key seems to be missing
-    return _explain_one(file, next(misspelt, errors[0]))[1]
+    first = next(misspelt, errors[0])
+    section = str(first["loc"][0]) if first["loc"] else ""
+    if first["type"] == "extra_forbidden" and section in ExperimentFile.model_fields.keys() - kind.model_fields.keys():
+        name = ".".join(map(str, first["loc"]))
+        *others, last = kind.model_fields
+        sections = f"{', '.join(others)} and {last}"
+        return InputError(
+            file, f"key {name}", f"is read from experiment.toml alone: keys of {sections} can be given here"
+        )
+    return _explain_one(file, first, kind)[1]
 
 
-def _explain_one(file: Path | str, first: ErrorDetails) -> tuple[str, InputError]:
-    """Return the key of a validation error, and the error for the user."""
+def _explain_one(file: Path | str, first: ErrorDetails, kind: type[Section] = ExperimentFile) -> tuple[str, InputError]:
+    """Return the key of a validation error, and the error for the user; kind: whose keys may be meant."""
     name = ".".join(str(part) for part in first["loc"] if str(part) not in _INNER and "[" not in str(part))
     where = f"key {name}" if name else ""
     if first["type"] == "extra_forbidden":
@@ -186,7 +195,7 @@ def _explain_one(file: Path | str, first: ErrorDetails) -> tuple[str, InputError
             wall = f"is the name of a wall: write [{name}] and, below it, {line}"
             if nearest_key(WallsSection, name.removeprefix("walls.")) is None:
                 return name, InputError(file, where, wall)
-        other = nearest_key(ExperimentFile, name)
+        other = nearest_key(kind, name)
         value = "" if isinstance(first["input"], dict) else f" (value {first['input']!r})"
         hint = f": did you mean {other}?" if other else ""
         return name, InputError(file, where, f"is not known{value}{hint}")

@@ -5,8 +5,9 @@ from __future__ import annotations
 from difflib import get_close_matches
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, model_validator
+from pydantic import BeforeValidator, field_validator, model_validator
 
+from .corrections import DIGITS, GREATEST_RADIUS, look_like_millimetres
 from .section import Finite, Length, Pixels, Section, Switch, above, between, key, whole
 
 OUTER = "outer"  # instead of a table: the outermost grains
@@ -147,6 +148,18 @@ class PhotographsSection(Section):
     corrections: str | None = key(
         "Table frame,id,x,y,theta of poses entered by hand in pixels and radians, or the word lost.", default=None
     )
+
+    @field_validator("radii")
+    @classmethod
+    def _radii_of_rods(cls, radii: tuple[float, ...]) -> tuple[float, ...]:
+        if any(radius > GREATEST_RADIUS for radius in radii):
+            metres = ", ".join(f"{1e-3 * radius:.{DIGITS}g}" for radius in radii)
+            guess = f"; they look like millimetres: write radii = [{metres}]"
+            raise ValueError(
+                f"value {list(radii)!r}: rods are not larger than {GREATEST_RADIUS:g} m: lengths are in metres"
+                f"{guess if all(look_like_millimetres(radius) for radius in radii) else ''}"
+            )
+        return radii
 
     @model_validator(mode="after")
     def _one_scale(self) -> PhotographsSection:

@@ -17,6 +17,8 @@ from .input_files import InputFiles
 from .plain_rows import Cells, split_plain
 
 LARGEST = 1e50  # in SI units no length, time or force is larger; its square and its cube are still numbers
+# Columns that the program itself adds to tables, for people or for other commands: they are not reported as unused.
+OWN_COLUMNS = frozenset({"number", "fn_i", "fn_j", "quality", "sigma1", "sigma2", "zncc", "patches"})
 GREATEST = 2**53  # float64 represents all whole numbers up to it
 
 
@@ -146,7 +148,7 @@ def read_table(
             raise InputError(file, f"row {content[: content.index(0)].count(10) + 1}", "holds a NUL character")
         header = _header(content)
         refuse_likely_names(file, header, columns, optional)
-        inputs.note_columns(file, [name for name in header if name not in (*columns, *optional)])
+        inputs.note_columns(file, [name for name in header if name not in (*columns, *optional, *OWN_COLUMNS)])
         plain = split_plain(content, columns, optional)
         if plain is not None:
             return Table(file, plain.values, plain.line)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import struct
 import time
 import uuid
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 import rerun as rr
 
 from ...experiment.units import Scale
+from ...process.atomic import replacing
 from ...process.errors import RunError
 from ...process.machine.free_memory import release_free_memory, return_large_blocks
 from ...results.results import Results, TruthContacts
@@ -137,11 +140,11 @@ def write_recording(
     )  # fmt: skip
     run = _Run(results, survey, scene, photograph, options.active, progress, part_frames)
     parts = [part_of(path, 1 + k) for k in range(max(-(-len(results.frames) // part_frames), 1))]
-    unfinished = [each.with_name(each.name + ".part") for each in parts]
     left_out = describe_detail(results.grains.count, survey.most_contacts)
     notes: tuple[str, ...] = (left_out,) if left_out else ()
     plans = _plans(sweeps, limited=max_size is not None)
-    try:
+    with ExitStack() as stack:  # files appear in reverse order: the first one completes the recording
+        unfinished = [stack.enter_context(replacing(each)) for each in parts]
         for number, plan in enumerate(plans):
             if number:
                 shown = f"{plan.kept} sweeps per frame" if plan.kept else "the reported fields only"
@@ -159,12 +162,7 @@ def write_recording(
             notes = (*notes, f"Still larger than {_megabytes(max_size)}: the frames themselves need that much.")
         if len(parts) > 1:
             notes = (*notes, f"The recording is {len(parts)} files, which open alone or, by the first, as one.")
-        for part, file in reversed(list(zip(unfinished, parts, strict=True))):  # the first one completes the recording
-            os.replace(part, file)
-        remove_parts(path, len(parts) + 1)
-    finally:
-        for part in unfinished:
-            part.unlink(missing_ok=True)
+    remove_parts(path, len(parts) + 1)
     return RecordingFile(
         path, _size(parts), time.perf_counter() - begin, len(results.frames), recorder.network_rows,
         plan.sweeps, recorder.clipped, notes, len(parts),
@@ -270,7 +268,7 @@ def _check_complete(part: Path) -> None:
         start, length, _checksum, *marks = FILE_END.unpack(end)
         if marks == END_MARKS and start + length == size - FILE_END.size:
             return
-    raise OSError(f"{part}: the recording could not be written completely (is the disk full?)")
+    raise OSError(errno.EIO, "the recording could not be written completely (is the disk full?)", str(part))
 
 
 def _megabytes(size: int) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from rerun.chunk import RrdReader
 
 from ...drawing.accumulated_strain import accumulated_strains
 from ...drawing.force_range import ForceRange
+from ...process.atomic import replacing
 from ...process.errors import InputError
 from ...results.results import Results
 from ..look.clock import Clock
@@ -68,25 +68,20 @@ def record_side_file(results: Results, recording: Path | str, target: Path | str
         raise ValueError(f"there is no frame {wrong[0]}: frames count from 0 to {count - 1}")
     entry = RrdReader(str(recording)).recordings()[0]
     style = ForceStyle.on(read_layout(recording).canvas, ForceRange.of(results.frames))
-    part = target.with_name(target.name + ".part")
     stream = rr.RecordingStream(
         entry.application_id, recording_id=entry.recording_id, send_properties=False, batcher_config=BATCHES
     )
-    try:
-        with writing(stream, part):
-            stream.set_log_time_enabled(False)
-            first = 0
-            strains = accumulated_strains([forces.strain for forces in results.frames])
-            for forces, strain in zip(results.frames, strains, strict=True):
-                span = forces.history.count + 1
-                if forces.frame in frames and forces.contacts.count:
-                    time = float(results.tracks.time[forces.frame])
-                    clock = Clock(stream, forces.frame, first, first + span - 1, time, strain)
-                    rows, fn, _ = visible_sweeps(forces, span - 1, SweepChoice.ALL, 0)
-                    # The first row, with the geometry, is in the recording.
-                    send_sweeps(clock, style, rows[1:], fn[1:], thin=True)
-                first += span
-        os.replace(part, target)
-    finally:
-        part.unlink(missing_ok=True)
+    with replacing(target) as part, writing(stream, part):
+        stream.set_log_time_enabled(False)
+        first = 0
+        strains = accumulated_strains([forces.strain for forces in results.frames])
+        for forces, strain in zip(results.frames, strains, strict=True):
+            span = forces.history.count + 1
+            if forces.frame in frames and forces.contacts.count:
+                time = float(results.tracks.time[forces.frame])
+                clock = Clock(stream, forces.frame, first, first + span - 1, time, strain)
+                rows, fn, _ = visible_sweeps(forces, span - 1, SweepChoice.ALL, 0)
+                # The first row, with the geometry, is in the recording.
+                send_sweeps(clock, style, rows[1:], fn[1:], thin=True)
+            first += span
     return target.stat().st_size

@@ -171,7 +171,7 @@ def calibrate_sd(frame: FrameForces) -> FrameForces:
 
 
 def _added_variance(frame: FrameForces, mean: float) -> Array:
-    """Variances (c, 2) [N²] that do not depend on what the members say: of the scale, and of the model."""
+    """Variances (c, 2) [N²] that no disagreement of the members shows: of the scale and of the model."""
     model = 0.0 if frame.soft else MODEL_ERROR * mean
     return _scale_errors(frame) ** 2 + model**2
 

@@ -28,6 +28,7 @@ def test_every_command_has_help_with_an_example_and_units(command, capsys):
     text = printed_text(capsys, name_of(command), "--help")
     assert f"Example: rodsight {name_of(command)} " in text
     assert "None" not in text
+    assert "%%" not in text
     assert "default: )" not in text
     for option, unit in QUANTITIES.items():
         if meaning := re.search(rf"{option} (?!N?\s*\|)[^-]*?(?= --|$)", text.split("options", 1)[1]):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.app.experiment.tables import edit
+from tests.app.experiment.tables import edit, swap_row
 from tests.app.experiment.test_likely_causes import change, reverse
 from tests.program import rodsight
 
@@ -69,3 +69,28 @@ def test_columns_that_are_not_used_are_named(tracked, capsys):
     file.write_text("\n".join([f"{head},brightness", *(f"{row},1.0" for row in rows)]) + "\n")
     assert rodsight("check", tracked, "--no-budget") == 0
     assert "columns that are not used: brightness" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize("command", ["check", "track"])
+def test_without_walls_true_forces_on_walls_are_ignored(tracked, tmp_path, capsys, command):
+    file = tracked / "experiment.toml"
+    head, _, rest = file.read_text().partition("[walls]")
+    file.write_text(head + rest.partition("\n[walls.top]\n")[2].partition("\n")[2])
+    assert "walls" not in file.read_text()
+    assert ",bottom," in (tracked / "truth_contacts.csv").read_text()
+    out = ("--no-budget",) if command == "check" else ("--out", tmp_path / "out")
+    assert rodsight(command, tracked, *out) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "truth_contacts.csv: contacts with walls are ignored, since no walls are given." in printed
+    swap_row(tracked / "truth_contacts.csv", 2, {2: "999"})
+    assert rodsight(command, tracked, *out) == 2
+    assert "row 2, j = '999': is not the id of a grain" in capsys.readouterr().err
+
+
+def test_a_wall_in_the_truth_of_a_packing_bounded_by_grains_is_explained(tracked, capsys):
+    file = tracked / "experiment.toml"
+    head, _, rest = file.read_text().partition("[walls]")
+    rest = rest.partition("\n[walls.top]\n")[2].partition("\n")[2]
+    file.write_text(f'{head}[boundary]\ngrains = "outer"\n{rest}')
+    assert rodsight("check", tracked, "--no-budget") == 2
+    assert "is neither a grain's id nor the name of a wall: no walls are given" in capsys.readouterr().err

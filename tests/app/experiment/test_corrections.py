@@ -42,6 +42,9 @@ def test_a_quantity_is_converted_to_the_unit_of_its_key(text, unit, number):
         (PRESSURE, f"{PRESSURE}\n{PRESSURE}", "this key is given twice"),
         ("length = 0.06", 'length = "6 cm"', ": write length = 0.06"),
         ("density = 2700.0", "density = 2700,0", "write density = 2700.0"),
+        ("density = 2700.0", "density == 2700.0", "'density == 2700.0': write density = 2700.0\n"),
+        ("density = 2700.0", "density := 2.7 g/cm3", ": write density = 2700.0\n"),
+        ("density = 2700.0", "density = two", "'density = two': invalid value\n"),
         ("density = 2700.0", 'density = "2.7 g/cm³"', ": write density = 2700.0"),
         ("density = 2700.0", "density = 2.7", "number ≥ 10, ≤ 23000 (Density of the rods [kg/m³])"),
         ("density = 2700.0", "density = 2.7", ": write density = 2700.0"),
@@ -87,7 +90,7 @@ def test_a_mistake_of_photographs_is_named_with_what_to_write(tmp_path, capsys, 
     ("radii", "named"),
     [
         ("[0.0001]", "are 0.4 px at this pixel_size, but must exceed 3 px: correct one of both"),
-        ("[1.0]", "of the radii photographs.radii, 4e+03 px at this pixel_size: correct one of both"),
+        ("[0.5]", "of the radii photographs.radii, 2e+03 px at this pixel_size: correct one of both"),
     ],
 )
 def test_radii_that_do_not_fit_the_photograph_are_named_in_pixels(made_photographs, tmp_path, capsys, radii, named):

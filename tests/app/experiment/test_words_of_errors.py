@@ -45,6 +45,8 @@ def test_no_unusable_value_of_any_key_shows_an_internal_word():
         ("solver", 5, r"key solver: value 5: is a section: write \[solver\] and its keys below it"),
         ("material.friction", [], r"key material\.friction: value \[\]; material\.friction is a number"),
         ("photographs.region", [1, 2, 3], r"key photographs\.region: value \[1, 2, 3\]; photographs\.region is a"),
+        ("photographs.radii", [7, 8, 11], r"look like millimetres: write radii = \[0\.007, 0\.008, 0\.011\]$"),
+        ("photographs.radii", [0.007, 700], r"rods are not larger than 0\.5 m: lengths are in metres$"),
     ],
 )
 def test_errors_name_the_key_and_the_kind_of_its_values(name, value, message):

@@ -141,6 +141,9 @@ def test_rodtracker_ends_of_the_first_camera(tmp_path, capsys):
     assert "red-1" in (tmp_path / "out" / "ids.csv").read_text()
 
 
+HALF = ("--pixel-size", 0.5)  # [m] the unit of length of simulations of rods with radius 1
+
+
 def dump(step: int, rows: list[str], *, box: str = "ff ff pp", columns: str = "id type x y z radius omegaz fx") -> str:
     bounds = "0 6\n0 4\n-0.5 0.5"
     head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{len(rows)}\nITEM: BOX BOUNDS {box}\n{bounds}\n"
@@ -151,13 +154,13 @@ def test_liggghts_dump_with_spins_and_a_fixed_box(tmp_path, capsys):
     one = dump(0, ["2 1 3 1 0 1 0.1 7", "1 1 1 1 0 1 0 7"])
     two = dump(100, ["1 1 1 1 0 1 0 7", "2 1 3 1.4 0 1 0.3 7"])
     (tmp_path / "dump.all").write_text(one + two)
-    printed = import_files(capsys, "lammps", tmp_path / "dump.all", tmp_path / "out", "--interval", 0.01)
-    expect_pair(tmp_path / "out", np.array([2.0, 0.0, 0.4]), 1.0)
+    printed = import_files(capsys, "lammps", tmp_path / "dump.all", tmp_path / "out", "--interval", 0.01, *HALF)
+    expect_pair(tmp_path / "out", np.array([1.0, 0.0, 0.2]), 0.5)
     tracks, walls = tracks_in(tmp_path / "out"), walls_in(tmp_path / "out")
     assert tracks.rotation[1] == pytest.approx([0.0, 0.2])
     assert tracks.time.tolist() == [0.0, 1.0]
     assert walls is not None
-    assert walls.endpoints[1, walls.name.index("right")] == pytest.approx(np.array([[6.0, 0.0], [6.0, 4.0]]))
+    assert walls.endpoints[1, walls.name.index("right")] == pytest.approx(np.array([[3.0, 0.0], [3.0, 2.0]]))
     assert "PROPOSED" not in printed
     assert "omegaz integrated" in printed
     assert "Left out: fx" in printed
@@ -170,8 +173,8 @@ def test_a_shrinking_box_gives_proposed_walls_and_an_empty_step_no_frame(tmp_pat
     for step, y in ((0, None), (800, 1.0), (1600, 1.4)):
         rows = [] if y is None else ["1 1 1 1 0 1 0 7", f"2 1 3 {y} 0 1 0 7"]
         (folder / f"dump{step}.liggghts").write_text(dump(step, rows, box="mm mm mm"))
-    printed = import_files(capsys, "lammps", folder, tmp_path / "out")
-    expect_pair(tmp_path / "out", np.array([2.0, 0.0, 0.4]), 1.0)
+    printed = import_files(capsys, "lammps", folder, tmp_path / "out", *HALF)
+    expect_pair(tmp_path / "out", np.array([1.0, 0.0, 0.2]), 0.5)
     assert "PROPOSED, NOT MEASURED: the faces of the simulation's box" in printed
     assert "PROPOSED, NOT MEASURED" in (tmp_path / "out" / "experiment.toml").read_text()
 
@@ -185,8 +188,8 @@ def test_lammps_dumps_of_a_folder_with_scaled_coordinates_and_quaternions(tmp_pa
         rows = ["1 1 2 0.1666666667 0.25 0.5 1 0 0 0", f"2 1 2 0.5 {y} 0.5 {half if step == 10 else '1 0 0 0'}"]
         (folder / f"dump.{step}").write_text(dump(step, rows, box="pp ff pp", columns=columns))
     (folder / "log.txt").write_text("no dump")
-    import_files(capsys, "lammps", folder, tmp_path / "out")
-    expect_pair(tmp_path / "out", np.array([2.0, 0.0, 0.4]), 1.0)
+    import_files(capsys, "lammps", folder, tmp_path / "out", *HALF)
+    expect_pair(tmp_path / "out", np.array([1.0, 0.0, 0.2]), 0.5)
     assert tracks_in(tmp_path / "out").rotation[1] == pytest.approx([0.0, 0.3])
     walls = walls_in(tmp_path / "out")
     assert walls is not None
@@ -206,8 +209,8 @@ def test_yade_text_of_two_steps(tmp_path, capsys):
     folder.mkdir()
     for step, z in ((9, 1.0), (10, 1.4)):
         (folder / f"s{step}.txt").write_text(f"#format x_y_z_r_matId\n# a test\n1\t0\t1\t1\t0\n3\t0\t{z}\t1\t0\n")
-    printed = import_files(capsys, "yade", folder, tmp_path / "out", "--columns", "y=z")
-    expect_pair(tmp_path / "out", np.array([2.0, 0.0, 0.4]), 1.0)
+    printed = import_files(capsys, "yade", folder, tmp_path / "out", "--columns", "y=z", *HALF)
+    expect_pair(tmp_path / "out", np.array([1.0, 0.0, 0.2]), 0.5)
     assert "Left out: matId" in printed
 
 
@@ -220,8 +223,8 @@ def test_yade_vtk_with_ids(tmp_path, capsys):
             f"3 {y} 0\n1 1 0\n\nPOINT_DATA 2\nSCALARS radius double 1\nLOOKUP_TABLE default\n1\n1\n\n"
             "SCALARS id int 1\nLOOKUP_TABLE default\n8\n4\n"
         )
-    import_files(capsys, "yade", folder, tmp_path / "out")
-    expect_pair(tmp_path / "out", np.array([2.0, 0.0, 0.4]), 1.0)
+    import_files(capsys, "yade", folder, tmp_path / "out", *HALF)
+    expect_pair(tmp_path / "out", np.array([1.0, 0.0, 0.2]), 0.5)
     assert tracks_in(tmp_path / "out").id.tolist() == [4, 8]
 
 

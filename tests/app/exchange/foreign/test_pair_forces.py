@@ -42,7 +42,7 @@ def test_a_dump_local_is_the_truth_in_the_sign_of_compression(tmp_path):
 
 
 def test_a_pair_across_a_periodic_edge_has_the_normal_of_the_nearest_image(tmp_path):
-    grains = dump(tmp_path, "1 0.005 0.05 0.01\n2 0.095 0.05 0.01", "pp")
+    grains = dump(tmp_path, "1 0.005 0.05 0.01\n2 0.095 0.05 0.01\n3 0.025 0.05 0.01\n4 0.075 0.05 0.01", "pp")
     pairs = tmp_path / "pairs.csv"
     pairs.write_text("frame,id1,id2,fx,fy\n100,1,2,3.0,0.0\n")  # 2 is on the left of 1 and pushes it to the right
     rodsight.import_table(grains, tmp_path / "out", form="lammps", pairs=pairs)

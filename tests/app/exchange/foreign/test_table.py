@@ -6,9 +6,11 @@ import codecs
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pyarrow
 import pyarrow.parquet
 import pytest
+import rodsight
 
 from .command import import_files, refuse, tracks_in, walls_in
 
@@ -80,6 +82,61 @@ def test_a_table_without_a_header_has_numbered_columns(tmp_path, capsys):
     assert tracks.radius.tolist() == [0.1, 0.1]
     assert np.isnan(tracks.rotation).all()
     assert "rotation is unknown" in printed
+
+
+@pytest.mark.parametrize("unit", [1.0, PIXEL])
+def test_lengths_in_millimetres_are_refused_as_the_check_refuses_them(tmp_path, capsys, unit):
+    file, out = write(tmp_path / "any.csv"), tmp_path / "out"
+    words = "makes the median radius 4 m: lengths are in metres; they look like millimetres"
+    if unit == 1.0:
+        line = refuse(capsys, "table", file, out, "--columns", COLUMNS, "--walls", "box", "--pressure", "top=50e3")
+        assert line.endswith(f"any.csv: column R: {words}\n")
+    else:  # radii alone: positions are in metres
+        table = pd.read_csv(file)
+        table[["X", "Y"]] *= unit
+        with pytest.raises(rodsight.InputError, match=f"^data frame: column R: {words}$"):
+            rodsight.import_table(table, out, dict(each.split("=") for each in COLUMNS.split(",")), walls="box")
+    assert [each.name for each in tmp_path.iterdir()] == ["any.csv"]
+
+
+@pytest.mark.parametrize("pressure", ["-50e3", "0", "1e300"])
+def test_a_pressure_is_refused_by_the_rule_of_the_experiment_file(tmp_path, capsys, pressure):
+    file = write(tmp_path / "any.csv")
+    arguments = ("--columns", COLUMNS, "--pixel-size", PIXEL, "--walls", "box")
+    line = refuse(capsys, "table", file, tmp_path / "out", *arguments, "--pressure", f"top={pressure}")
+    assert f"--pressure: top: value {float(pressure)!r}; walls.top.pressure is a number ≥ 0.001, ≤ 1e+11" in line
+    line = refuse(capsys, "table", file, tmp_path / "out", *arguments, "--load", "top=0")
+    assert "--load: top: is 0 N alone" in line
+    assert [each.name for each in tmp_path.iterdir()] == ["any.csv"]
+
+
+def test_an_import_that_makes_no_valid_experiment_leaves_nothing(tmp_path, capsys):
+    file = write(tmp_path / "any.csv")
+    arguments = ("table", file, tmp_path / "out", "--columns", COLUMNS, "--pixel-size", PIXEL)
+    assert "--precision: 10 m: is more than the rods' radius, 0.004 m" in refuse(capsys, *arguments, "--precision", 1e4)
+    (tmp_path / "bars.csv").write_text("frame,wall,x1,y1,x2,y2\n5,file,0,0,30,0\n")  # a name that is a key of [walls]
+    line = refuse(capsys, *arguments, "--walls", tmp_path / "bars.csv", "--pressure", "file=50e3")
+    assert line.startswith(f"rodsight: {tmp_path}/out/experiment.toml: is not TOML: ")
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["any.csv", "bars.csv"]
+
+
+def test_columns_are_given_by_number_where_there_is_a_header(tmp_path, capsys):
+    numbers = "frame=1,id=2,x=3,y=4,theta=5,radius=6"
+    arguments = ("--pixel-size", PIXEL, "--y-down", "--degrees", "--interval", 30)
+    file = write(tmp_path / "any.csv")
+    import_files(capsys, "table", file, tmp_path / "out", "--columns", numbers, *arguments)
+    expect_rows(tmp_path / "out")
+    line = refuse(capsys, "table", file, tmp_path / "no", "--columns", numbers.replace("6", "7"))
+    assert "column 7: there is no such column (columns: t, rod, X, Y, turn, R)" in line
+
+
+def test_the_check_of_an_imported_table_names_no_column_of_the_importer(tmp_path, capsys):
+    import_files(
+        capsys, "table", write(tmp_path / "any.csv"), tmp_path / "out", "--columns", COLUMNS, "--pixel-size", PIXEL,
+        "--y-down", "--degrees", "--walls", "box",
+    )  # fmt: skip
+    assert "number" in (tmp_path / "out/times.csv").read_text()
+    assert rodsight.check(tmp_path / "out", predict=False)["unused"] == ()
 
 
 def test_y_is_measured_from_the_last_row_with_a_given_height(tmp_path, capsys):
@@ -154,10 +211,11 @@ def test_errors_are_named_and_nothing_is_written(tmp_path, capsys, text, columns
 
 def test_inconsistent_options_are_refused(tmp_path, capsys):
     file = write(tmp_path / "any.csv")
-    arguments = ("table", file, tmp_path / "out", "--columns", COLUMNS)
+    arguments = ("table", file, tmp_path / "out", "--columns", COLUMNS, "--y-down")
+    assert "is not positive" in refuse(capsys, *arguments, "--pixel-size", -1)
+    arguments = (*arguments, "--pixel-size", PIXEL)
     assert "is not a wall" in refuse(capsys, *arguments, "--pressure", "top=5e4")
     assert "is not WALL=PA" in refuse(capsys, *arguments, "--walls", "box", "--pressure", "top")
-    assert "is not positive" in refuse(capsys, *arguments, "--pixel-size", -1)
     assert "there is no such file" in refuse(capsys, *arguments, "--walls", tmp_path / "none.csv")
     import_files(capsys, *arguments)
     assert "already exists" in refuse(capsys, *arguments)

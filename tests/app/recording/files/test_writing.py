@@ -35,7 +35,7 @@ def test_a_full_disk_is_reported_and_the_older_recording_kept(results, tmp_path,
     monkeypatch.setattr(writing, "write_all", filling)
     with pytest.raises(OSError, match="No space left") as raised:
         write_recording(results, file)
-    assert raised.value.filename == f"{file}.part"
+    assert raised.value.filename == str(file)
     assert [each.name for each in tmp_path.iterdir()] == [file.name]
     assert file.read_bytes() == b"older"
 
@@ -83,6 +83,6 @@ def test_a_full_disk_prevents_the_recording_and_nothing_else(tracked, tmp_path, 
         [*RODSIGHT, "record", tracked, "--out", small_disk, *FEW], capture_output=True, text=True, timeout=120
     )
     assert run.returncode == 1, run.stderr
-    assert "recording.rrd.part: No space left on device" in run.stderr
+    assert "recording.rrd: No space left on device" in run.stderr
     assert run.stderr.splitlines()[-1].startswith("rodsight: ")
     assert sorted(each.name for each in small_disk.iterdir()) == ["manifest.json", "others", "results.h5"]
