@@ -10,6 +10,7 @@ from . import pipeline
 from .compilation.ahead import SOLVER_KERNELS
 from .inference.diagnosis.trial import PREDICTED_PHOTOGRAPHS
 from .prediction import Prediction, describe_photographs, predict_accuracy
+from .process.counts import state_count
 from .results.finding import Finding
 from .run_folder import Run
 from .tracks import Tracks, WallTracks
@@ -40,10 +41,11 @@ class InputReport:
     def content(self) -> str:
         """Describe the content of the experiment in a phrase."""
         if not self.photographs:
-            grains = f"{self.grains}" if self.tracked in (None, self.grains) else f"{self.tracked} of {self.grains}"
-            return f"{grains} grains tracked over {self.frames} frames, {self.boundaries}"
-        detected = "" if self.grains is None else f", {self.grains} grains in the first"
-        return f"{self.frames} photographs{detected}, {self.boundaries}"
+            part = "" if self.tracked in (None, self.grains) else f"{self.tracked} of "
+            grains = f"{part}{state_count(self.grains or 0, 'grain')}"
+            return f"{grains} tracked over {state_count(self.frames, 'frame')}, {self.boundaries}"
+        detected = "" if self.grains is None else f", {state_count(self.grains, 'grain')} in the first"
+        return f"{state_count(self.frames, 'photograph')}{detected}, {self.boundaries}"
 
     def as_plain(self) -> dict[str, Any]:
         """Return plain values for JSON; None where a number is unknown."""
@@ -99,7 +101,7 @@ def _describe_boundaries(tracks: Tracks | None, walls: WallTracks | None) -> str
     """Describe the boundaries of the packing in a phrase."""
     if walls is None:
         return "no walls: it can be tracked but not solved"
-    parts = [f"{walls.count} walls"] if walls.count else []
+    parts = [state_count(walls.count, "wall")] if walls.count else []
     if walls.cell is not None:
         parts.append("in a periodic cell")
     if tracks is not None and tracks.boundary is not None:

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .process.counts import state_count
 from .solver.bodies.grains import Array
 from .solver.bodies.wall_shapes import STRAIGHT, all_sides, circle_parameters, outlines
 from .solver.quantity import Quantity, quantities
@@ -222,8 +223,7 @@ def held_once(column: NDArray[Any]) -> NDArray[Any]:
 
 
 def _counted(marked: ArrayLike, noun: str) -> str:
-    count = int(np.sum(marked))
-    return f"{count} {noun}{'' if count == 1 else 's'}"
+    return state_count(int(np.sum(marked)), noun)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from ..process.counts import state_count
 from ..solver.even_subset import even_subset
 from ..solver.frame_forces import FrameStatus
 
@@ -45,9 +46,9 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
     count = summary["status_count"]
     settled, total = count.get("settled", 0), summary["frame_count"]
     after = summary["settled_after"]
-    how_many = f"{settled} of {total} frames {'is' if settled == 1 else 'are'} settled"
+    how_many = f"{settled} of {state_count(total, 'frame')} {'is' if settled == 1 else 'are'} settled"
     lines = [
-        f"[bold]{summary['grain_count']} grains, {total} frames.[/] "
+        f"[bold]{state_count(summary['grain_count'], 'grain')}, {state_count(total, 'frame')}.[/] "
         + (f"Settled from frame {after}; {how_many}." if settled else "No frame settled.")
     ]
     events = [
@@ -58,9 +59,11 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
     if events:
         lines.append("Events: " + "; ".join(events) + ".")
     lines += _failure_lines(summary["failures"])
-    lost = f"{summary['lost_poses']} poses of {summary['lost_grains']} grains lost" if summary["lost_poses"] else ""
-    suspect = f"{summary['suspect_poses']} poses suspect" if summary["suspect_poses"] else ""
-    cut = f"{summary['cut_grains']} rods cut by the picture's border" if summary.get("cut_grains") else ""
+    poses, grains = state_count(summary["lost_poses"], "pose"), state_count(summary["lost_grains"], "grain")
+    lost = f"{poses} of {grains} lost" if summary["lost_poses"] else ""
+    suspect = f"{state_count(summary['suspect_poses'], 'pose')} suspect" if summary["suspect_poses"] else ""
+    border = "cut by the picture's border"
+    cut = f"{state_count(summary['cut_grains'], 'rod')} {border}" if summary.get("cut_grains") else ""
     tracked = ", ".join(part for part in (lost, suspect, cut) if part) or "every grain has a pose in every frame"
     worst = _cell(summary["worst_unbalance"], ".3f")
     lines.append(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, KDTree
 
+from ..process.counts import state_count
 from ..process.errors import InputError
 from ..solver.bodies.grains import Array
 from ..solver.bodies.wall_shapes import IN, OUT, STRAIGHT, beside_wall, bounding_distance, wall_distance
@@ -233,7 +234,7 @@ def rods_beyond_ends(tracks: Tracks, walls: WallTracks) -> list[str]:
     for w, rods in enumerate(bearing_past_ends(sequence).sum(axis=0).tolist()):
         if rods:
             sentences.append(
-                f"{rods} rod{'s' if rods > 1 else ''} may touch the line of wall {walls.name[w]!r} beyond its end: the "
+                f"{state_count(rods, 'rod')} may touch the line of wall {walls.name[w]!r} beyond its end: the "
                 "wall is continued along them, unless calibration.walls_continue is false"
             )
     return sentences

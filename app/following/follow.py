@@ -23,6 +23,7 @@ from ..inference.infer_sequence import infer_sequence
 from ..inference.inference_settings import material_of, settings_of
 from ..inference.inputs import Inputs
 from ..inference.solve_frames import InferenceObserver
+from ..process.counts import state_count
 from ..process.errors import InputError
 from ..process.frame_range import ALL_FRAMES
 from ..process.sources import hash_of_code
@@ -179,7 +180,7 @@ def _report_lost(tracks: Tracks, frame: int, before: frozenset[int], alarm: Alar
         alarm(frame, reason)
     elif newly_lost:
         names = ", ".join(str(each) for each in newly_lost[:5]) + (" …" if len(newly_lost) > 5 else "")
-        alarm(frame, f"{len(newly_lost)} rod{'s' if len(newly_lost) > 1 else ''} lost: {names}")
+        alarm(frame, f"{state_count(len(newly_lost), 'rod')} lost: {names}")
     return lost
 
 

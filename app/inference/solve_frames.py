@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from ..process.counts import state_count
 from ..process.progress import Progress, no_progress
 from ..solver.assessment.intervals.statistic_intervals import with_sd
 from ..solver.contacts.contacts import ContactSource
@@ -80,7 +81,11 @@ def with_remarks(sequence: CorrectedSequence, forces: FrameForces) -> FrameForce
     theirs = padded[contacts.i] | padded[np.minimum(contacts.j, len(interpolated))]
     theirs &= forces.source == ContactSource.DETECTED
     source = np.where(theirs, np.uint8(ContactSource.INTERPOLATED), forces.source)
-    return replace(forces, source=source, reason=f"{interpolated.sum()} lost rods are interpolated; {forces.reason}")
+    return replace(
+        forces,
+        source=source,
+        reason=f"{state_count(int(interpolated.sum()), 'lost rod')} interpolated; {forces.reason}",
+    )
 
 
 def summarise_frame(sequence: CorrectedSequence, forces: FrameForces) -> FrameStatistics:

@@ -11,6 +11,7 @@ import pandas as pd
 
 from ..exchange.tidy_tables import TableName, make_table
 from ..out_of_date import state_of_source
+from ..process.counts import state_count
 from ..process.errors import FigureError, InputError, MissingFileError, MissingFrameError
 from ..results.hdf5.store import load_results
 from ..results.results import Results
@@ -290,8 +291,9 @@ class Run:
 
     def __repr__(self) -> str:
         tracks = self.results.tracks
+        grains = state_count(tracks.grain_count, "grain")
         state = f", out of date: {'; '.join(self.out_of_date)}" if self.out_of_date else ""
-        return f"<rodsight.Run {self.name!r}: {tracks.grain_count} grains, {tracks.frame_count} frames{state}>"
+        return f"<rodsight.Run {self.name!r}: {grains}, {state_count(tracks.frame_count, 'frame')}{state}>"
 
     def checked_frame(self, frame: int) -> int:
         """Return the frame. Raises InputError, which is an IndexError as well if there is no such frame.

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from ..process.counts import state_count
 from ..solver.bodies.grains import Array
 from ..solver.bodies.walls import Walls
 from ..solver.contacts.contacts import Contacts, measure_contacts
@@ -93,9 +94,11 @@ def compare_runs(
         dropped += lost
     notes = [how] if how else []
     if stop - first < max(a.tracks.frame_count, b.tracks.frame_count):
-        notes.append(f"Only {stop - first} frames are in both runs.")
+        notes.append(f"Only {state_count(stop - first, 'frame')} in both runs.")
     if dropped:
-        notes.append(f"{dropped} contacts of {names[1]} are of bodies that {names[0]} does not have: left out.")
+        notes.append(
+            f"Left out: {state_count(dropped, 'contact')} of {names[1]} with bodies that {names[0]} does not have."
+        )
     return _compared(base, ComparedField(names[1], frames), names[0], notes)
 
 
@@ -160,7 +163,11 @@ def _match_grains(a: Results, b: Results, frame_a: int, frame_b: int) -> tuple[N
         )
     rows = np.full(len(b.tracks.id), -1, np.int64)
     rows[present_b[close]] = present_a[nearest[close]]
-    return rows, f"Ids denote different grains in the two runs: {close.sum()} grains were matched by their positions."
+    return (
+        rows,
+        f"Ids denote different grains in the two runs: {state_count(int(close.sum()), 'grain')} matched by their "
+        "positions.",
+    )
 
 
 def _match_walls(a: Results, b: Results) -> NDArray[np.int64]:

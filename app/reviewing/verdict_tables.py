@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.console import Console
 
 from ..experiment.reading.tables import Table
+from ..process.counts import state_count
 from ..verdicts.reviewer_name import account_name
 from ..verdicts.table import export_verdicts, import_verdicts
 from .judging.candidate_pairs import find_candidate_pairs, gap_in_radii
@@ -21,7 +22,7 @@ def import_table(path: Path, file: Path, *, reviewer: str | None, complete: bool
     """Append a table of verdicts, or of contacts, to the log of a run, and print their number; the exit status."""
     count = import_verdicts_of_run(path, file, reviewer=reviewer, complete=complete)
     log = open_reviewed_run(path).log
-    Console().print(f"{count} verdicts added to {log.file}.", highlight=False, soft_wrap=True)
+    Console().print(f"{state_count(count, 'verdict')} added to {log.file}.", highlight=False, soft_wrap=True)
     return 0
 
 
@@ -57,5 +58,5 @@ def _default_reviewer(file: Path | Table) -> str:
 def export_table(path: Path, file: Path) -> int:
     """Write the verdicts of a run as a table; return the exit status."""
     count = export_verdicts(open_reviewed_run(path).log, file)
-    Console().print(f"{count} verdicts in {file}.", highlight=False, soft_wrap=True)
+    Console().print(f"{state_count(count, 'verdict')} in {file}.", highlight=False, soft_wrap=True)
     return 0

@@ -17,6 +17,7 @@ from rich.table import Table
 
 from ..experiment.reading.tables import write_table
 from ..process.atomic import replacing, write_atomically
+from ..process.counts import state_count
 from ..process.errors import InputError
 from .design import Case, Design
 from .factors import Factor
@@ -84,7 +85,9 @@ class SensitivityResults:
         done = [effect for effect in self.effects if not effect.failure]
         if len(done) < 2 * len(self.factors) + 2:
             reason = next(effect.failure for effect in self.effects if effect.failure)
-            raise InputError("--samples", str(len(self.cases)), f"only {len(done)} runs succeeded: {reason}")
+            raise InputError(
+                "--samples", str(len(self.cases)), f"only {state_count(len(done), 'run')} succeeded: {reason}"
+            )
         return {name: main_effects(unit, np.array([getattr(each, name) for each in done])) for name in RESULTS}
 
     def sentence(self) -> str:
@@ -162,7 +165,7 @@ def print_sensitivity(console: Console, results: SensitivityResults) -> None:
     console.print(_effect_table(results) if results.design == "oat" else _design_table(results))
     failed = [each.failure for each in results.effects if each.failure]
     if failed:
-        console.print(f"{len(failed)} runs failed: {failed[0]}", highlight=False, markup=False)
+        console.print(f"{state_count(len(failed), 'run')} failed: {failed[0]}", highlight=False, markup=False)
     console.print(results.sentence(), highlight=False, markup=False)
 
 

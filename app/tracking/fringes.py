@@ -14,6 +14,7 @@ import numpy as np
 from ..experiment.photographs import Photographs
 from ..experiment.pictures.image import Image
 from ..experiment.units import Scale
+from ..process.counts import state_count
 from ..process.errors import InputError
 from ..process.progress import Progress, no_progress
 from ..solver.bodies.grains import Array
@@ -51,7 +52,7 @@ def measure_fringes(photographs: Photographs, tracks: Tracks, scale: Scale, prog
     if len(photographs) < tracks.frame_count:
         raise InputError(
             photographs.files[0], "key photographs.fringes",
-            f"gives {len(photographs)} photographs for {tracks.frame_count} frames",
+            f"gives {state_count(len(photographs), 'photograph')} for {state_count(tracks.frame_count, 'frame')}",
         )  # fmt: skip
     found = np.full((tracks.frame_count, tracks.grain_count), np.nan)
     for k in range(tracks.frame_count):

@@ -91,7 +91,7 @@ def open_review(path: Path, *, port: int, browser: bool, reviewer: str | None) -
     console.print(f"Review of {name}: {server.address}", highlight=False, soft_wrap=True)
     console.print(f"Verdicts go to {log.file}. Stop with Ctrl-C.", highlight=False, soft_wrap=True)
     _serve(server, browser=browser)
-    console.print(f"{len(log.latest_entries())} verdicts and flags in the log. Next: rodsight solve", highlight=False)
+    console.print(f"Verdicts and flags in the log: {len(log.latest_entries())}. Next: rodsight solve", highlight=False)
     return 0
 
 

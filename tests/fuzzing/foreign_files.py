@@ -53,9 +53,9 @@ FORMS: tuple[tuple[str, dict[str, str], tuple[str, ...]], ...] = (
     ("trackmate", {"spots.csv": SPOTS}, ()),
     ("trackmate", {"tracks.xml": TRACKS}, ("--pixel-size", "1e-3", "--radius", "5", "--walls", "outer")),
     ("rodtracker", {"rods.csv": RODS}, ("--pixel-size", "1e-3", "--radius", "5")),
-    ("lammps", {"dump.all": DUMP}, ("--interval", "0.01")),
-    ("yade", {"s0.txt": YADE, "s1.txt": YADE.replace("1.4", "1.5")}, ()),
-    ("yade", {"a-spheres-00000000.vtk": VTK, "a-spheres-00000001.vtk": VTK}, ()),
+    ("lammps", {"dump.all": DUMP}, ("--interval", "0.01", "--pixel-size", "1e-2")),
+    ("yade", {"s0.txt": YADE, "s1.txt": YADE.replace("1.4", "1.5")}, ("--pixel-size", "1e-2")),
+    ("yade", {"a-spheres-00000000.vtk": VTK, "a-spheres-00000001.vtk": VTK}, ("--pixel-size", "1e-2")),
     ("pegs", PEGS, ("--pixel-size", "1e-4")),
 )
 

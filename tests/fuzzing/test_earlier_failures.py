@@ -77,7 +77,7 @@ def test_an_empty_table_of_another_program_is_named(originals, tmp_path, file):
 
 
 def test_rods_wider_than_the_photograph_are_not_found(originals):
-    ended = attempt(["check", str(originals.photographed), "--set", "photographs.radii=[1e3]", "--quiet"])
+    ended = attempt(["check", str(originals.photographed), "--set", "photographs.radii=[0.5]", "--quiet"])
     assert find_problem(ended, None, (2,)) == ""
     assert "no grains were found" in ended.errors
 

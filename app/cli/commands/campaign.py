@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from ...process.counts import state_count
 from ...process.errors import RunError
 from ..arguments import AsJson, Quiet, Scheduler, Workers, worker_count
 from ..terminal import print_line, progress_of, table_console
@@ -67,7 +68,7 @@ def campaign(
     _print(console, done.rows)
     for each in done.failed:
         print_line(console, f"{each.name} failed: {each.error}")
-    counts = f"{len(cases)} runs, {done.reused} of them reused, {len(done.failed)} failed"
+    counts = f"{state_count(len(cases), 'run')}, {done.reused} of them reused, {len(done.failed)} failed"
     print_line(console, f"{counts}. Report: {done.report}")
     return _status(done, len(cases))
 
@@ -93,4 +94,4 @@ def _status(done: CampaignResults, count: int) -> int:
     if not done.failed:
         return 0
     first = done.failed[0]
-    raise RunError(f"{len(done.failed)} of {count} runs failed, first {first.name}: {first.error}")
+    raise RunError(f"{len(done.failed)} of {state_count(count, 'run')} failed, first {first.name}: {first.error}")

@@ -9,6 +9,7 @@ import tyro
 from rich.console import Console
 
 from ...exported_files import ExportKind, TableForm, Timeline, check_options
+from ...process.counts import state_count
 from ...process.errors import InputError
 from ..arguments import Frames, Quiet, parse_frames, refuse_step, refuse_unused
 from ..stored_results import recording_file, results_file, warn_out_of_date
@@ -204,7 +205,7 @@ def _share(
             report = share_recording(recording, part, first=first, stop=stop, scale=scale)
         except ValueError as error:
             raise InputError(recording, "", str(error)) from None
-        extent = f"{_size(report.size)} of {_size(report.former_size)}, {report.frames} frames"
+        extent = f"{_size(report.size)} of {_size(report.former_size)}, {state_count(report.frames, 'frame')}"
         if not page:
             print_line(console, f"{file}: {extent}. To view it: rodsight view {file}")
             return 0
@@ -246,7 +247,9 @@ def _share_several(
             for recording, part in zip(recordings, parts, strict=True)
         ]
         size = write_single_page(parts, file, title=name, cards=cards)
-    print_line(console, f"{file}: {_size(size)}, {len(parts)} runs and one viewer; any browser opens it.")
+    print_line(
+        console, f"{file}: {_size(size)}, {state_count(len(parts), 'run')} and one viewer; any browser opens it."
+    )
     return 0
 
 
@@ -263,8 +266,8 @@ def _repair(damaged: Path, out: Path | None, console: Console) -> int:
         raise InputError(damaged, "", str(error)) from None
     print_line(
         console,
-        f"{target}: the forces of {report.frames} frames saved, {_size(report.size)} of {_size(report.former_size)}. "
-        f"To view it: rodsight view {target}",
+        f"{target}: the forces of {state_count(report.frames, 'frame')} saved, {_size(report.size)} of "
+        f"{_size(report.former_size)}. To view it: rodsight view {target}",
     )
     return 0
 

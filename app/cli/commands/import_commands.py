@@ -10,6 +10,7 @@ import tyro
 from rich.console import Console
 
 from ...exchange.foreign.format_names import FileFormat
+from ...process.counts import state_count
 from ...process.errors import InputError
 from ..arguments import Quiet
 from ..terminal import print_line
@@ -140,16 +141,18 @@ def _report(console: Console, out: Path, imported: ImportedTracks, contents: Fol
         print_line(console, "The box has two periodic directions: [boundary] periodic, with its vectors in cell.csv.")
     elif contents.outer_grains:
         which = (
-            f"The {len(contents.edge)} grains at the edge, by the file," if contents.edge else "The outermost grains"
+            f"By the file, {state_count(len(contents.edge), 'grain')} at the edge"
+            if contents.edge
+            else "The outermost grains"
         )
-        print_line(console, f"{which} are the boundary ([boundary] grains), since no walls are given.")
+        print_line(console, f"{which} form the boundary ([boundary] grains), since no walls are given.")
     if contents.truth is not None:
-        print_line(console, f"{len(contents.truth['frame'])} measured forces are in truth_contacts.csv.")  # type: ignore[arg-type]
+        print_line(console, f"In truth_contacts.csv: {state_count(len(contents.truth['frame']), 'measured force')}.")
     given = (contents.walls, contents.corners, contents.cell)
     bounded = any(each is not None for each in given) or contents.outer_grains
     add = "" if bounded else f"add [walls] to {out / 'experiment.toml'}, then "
     print_line(
         console,
-        f"{out}: {tracks.grain_count} grains in {tracks.frame_count} frames. Next: {add}rodsight check {out}, then "
-        f"rodsight run {out}",
+        f"{out}: {state_count(tracks.grain_count, 'grain')} in {state_count(tracks.frame_count, 'frame')}. "
+        f"Next: {add}rodsight check {out}, then rodsight run {out}",
     )

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 from rich.console import Console
 
+from ...process.counts import state_count
 from ...process.errors import InputError
 from ..arguments import (
     AsJson,
@@ -192,10 +193,13 @@ def track(
         tracks, walls = pipeline.track(run)
         page = pipeline.report_tracking(run, tracks, walls) if report else None
     console = request.console
-    renewed = f", {tracks.renewal_count} damaged grains with a new reference" if tracks.renewal_count else ""
+    renewed = (
+        f", {state_count(tracks.renewal_count, 'damaged grain')} with a new reference" if tracks.renewal_count else ""
+    )
     where = run.file(TRACKS) if run.experiment.config.photographs else "the experiment's own tables"
     console.print(
-        f"{tracks.grain_count} grains over {tracks.frame_count} frames, {tracks.describe_missing()}{renewed}; "
+        f"{state_count(tracks.grain_count, 'grain')} over {state_count(tracks.frame_count, 'frame')}, "
+        f"{tracks.describe_missing()}{renewed}; "
         f"tracks in {where}.",
         highlight=False,
     )

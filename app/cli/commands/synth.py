@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, get_args
 import tyro
 from rich.console import Console
 
+from ...process.counts import state_count
 from ...process.errors import InputError, RunError
 from ...synthetic.scenarios.preset_names import FringedPreset, MeasuredPreset, PhotographedPreset, ScenarioName
 from ..arguments import Quiet
@@ -107,7 +108,7 @@ def synth(
             else:
                 made = make_scenario(out, preset, seed, grains=grains, noise=noise, progress=progress)
     if not quiet:
-        content = f"{len(made.truth.radius)} rods, {made.truth.frame_count} frames"
+        content = f"{state_count(len(made.truth.radius), 'rod')}, {state_count(made.truth.frame_count, 'frame')}"
         Console().print(f"{out}: {content}. Next: rodsight run {out}", highlight=False)
     return 0
 
@@ -117,7 +118,7 @@ def _photoelastic(out: Path, seed: int, grains: int | None, progress: Progress, 
 
     made = make_photoelastic(out, seed, grains=grains, progress=progress)
     if not quiet:
-        content = f"{len(made.truth.radius)} discs, {made.truth.frame_count} photographs"
+        content = f"{state_count(len(made.truth.radius), 'disc')}, {state_count(made.truth.frame_count, 'photograph')}"
         command = f"rodsight import pegs {out} EXPERIMENT --pixel-size {made.pixel_size:.4g}"
         Console().print(f"{out}: {content}. Next: {command}", highlight=False, soft_wrap=True)
     return 0

@@ -12,6 +12,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from ...process.counts import state_count
 from ...process.errors import InputError
 from ...process.machine.browser import open_page
 from ..arguments import AsJson, Browser, Port, ResultsPath, refuse_unused
@@ -356,8 +357,9 @@ def _print_comparison(comparison: Comparison, console: Console) -> None:
     difference = float(np.sqrt(np.nanmean(np.diff(angle, axis=1) ** 2)))
     print_line(
         console,
-        f"{first.name} against {second.name}, {len(r)} frames: r(f_n) mean {mean[0]:.3f}, least {least:.3f}; r(f_t) "
-        f"mean {mean[1]:.3f}; relative L2 {mean[2]:.3f}; ratio of the sums of f_n {mean[3]:.3f}; friction angles "
+        f"{first.name} against {second.name}, {state_count(len(r), 'frame')}: r(f_n) mean {mean[0]:.3f}, least "
+        f"{least:.3f}; r(f_t) mean {mean[1]:.3f}; "
+        f"relative L2 {mean[2]:.3f}; ratio of the sums of f_n {mean[3]:.3f}; friction angles "
         f"differ by {difference:.2f}° rms.",
     )
     for note in comparison.notes:

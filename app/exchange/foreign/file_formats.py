@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...experiment.reading.tables import Table
+from ...process.counts import state_count
 from ...process.errors import InputError
 from ...solver.bodies.grains import Array
 from ..dic_files import DicSequence, read_sequence
@@ -162,12 +163,12 @@ def _radius_column(columns: Mapping[str, str]) -> int | None:
 def _dic_remarks(sequence: DicSequence, *, missing: int, unit: float | None) -> Iterator[str]:
     """Name what is left out or assumed."""
     if missing:
-        yield f"{missing} poses lost."
+        yield f"{state_count(missing, 'pose')} lost."
     if sequence.markers:
         radii = " and ".join(f"{each:g}" for each in sorted(set(sequence.markers)))
         count = len(sequence.markers)
-        rows = f"{count} row{'s' if count > 1 else ''}"
-        yield f"{rows} of radius {radii} {'are' if count > 1 else 'is'} no rod but a marker: left out."
+        verb = "are" if count > 1 else "is"
+        yield f"{state_count(count, 'row')} of radius {radii} {verb} no rod but a marker: left out."
     if sequence.other_form:
         yield "CONF files in the same folder are not read, since dic_out files hold the same poses."
     if sequence.in_metres:

@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 from numpy.typing import NDArray
 
 from ...experiment.reading.tables import Table
+from ...process.counts import state_count
 from ...process.errors import InputError
 from ...solver.bodies.grains import Array
 from ...tracks import Tracks, TrackStatus
@@ -114,10 +115,10 @@ def make_tracks(observed: Observations, convention: Convention, precision: float
     radius[frame, row] = convention.unit * observed.radius
     rotation, jumped = (rotation, 0) if observed.unwrapped else _unwrap(rotation)
     if jumped:
-        remarks.append(f"Jumps by 2π were removed from the angles of {jumped} grains.")
+        remarks.append(f"Jumps by 2π were removed from the angles of {state_count(jumped, 'grain')}.")
     known = np.isfinite(rotation).any(axis=0) if n else np.zeros(0, np.bool_)
     if not known.all():
-        which = "is" if not known.any() else f"of {int((~known).sum())} grains is"
+        which = "is" if not known.any() else f"of {state_count(int((~known).sum()), 'grain')} is"
         remarks.append(f"The rotation {which} unknown.")
     present = np.isfinite(position).all(axis=2)
     tracks = Tracks(
@@ -131,7 +132,7 @@ def make_tracks(observed: Observations, convention: Convention, precision: float
         status=np.where(present, TrackStatus.GIVEN, TrackStatus.LOST).astype(np.uint8),
     )
     if missing := int((~present).sum()):
-        remarks.append(f"{missing} poses lost: these grains are missing from some frames.")
+        remarks.append(f"{state_count(missing, 'pose')} lost: not every grain is in every frame.")
     imported = ImportedTracks(tracks, number, names, floor, tuple(remarks))
     if imported.renamed:
         renamed = f"Ids that are not integers are replaced by 0 … {n - 1}: see ids.csv."
@@ -202,8 +203,9 @@ def _one_radius(
         radius = np.where(known, radius, convention.unit * convention.radius)
     elif not known.all():
         missing = names[int(np.flatnonzero(~known)[0])]
+        grains = state_count(int((~known).sum()), "grain")
         raise InputError(
-            observed.rows.file, "", f"gives no radius of {int((~known).sum())} grains (the first: {missing}): name its "
+            observed.rows.file, "", f"gives no radius of {grains} (the first: {missing}): name its "
             "column, radius=… or diameter=…, or give --radius"
         )  # fmt: skip
     median = np.nanmedian(radius, axis=0)
@@ -213,7 +215,8 @@ def _one_radius(
     variation = np.nanmax(radius, axis=0) - np.nanmin(radius, axis=0)
     if varying := int((variation > RADIUS_VARIATION * median).sum()):
         remarks.append(
-            f"The radius of {varying} grains varies by more than {RADIUS_VARIATION:.0%}: the median is used."
+            f"The radius of {state_count(varying, 'grain')} varies by more than {RADIUS_VARIATION:.0%}: the median is "
+            "used."
         )
     return median
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ...experiment.reading.photograph_order import natural_key
 from ...experiment.reading.tables import Table
+from ...process.counts import state_count
 from ...process.errors import InputError
 from ...solver.bodies.grains import Array
 from ...solver.bodies.wall_shapes import wall_distance
@@ -99,8 +100,8 @@ def without_copies(readings: ForceReadings) -> tuple[ForceReadings, str]:
     kept = ~twice | (readings.disc < readings.other)
     one = ForceReadings(*(getattr(readings, each.name)[kept] for each in fields(ForceReadings)))
     return one, (
-        f"The forces of {int(twice.sum()) // 2} contacts are given twice and are equal: copies, not two readings. "
-        "Their error is unknown."
+        f"The forces of {state_count(int(twice.sum()) // 2, 'contact')} are given twice and are equal: copies, not two "
+        "readings. Their error is unknown."
     )
 
 
@@ -148,7 +149,7 @@ def without_distant(readings: ForceReadings, imported: ImportedTracks) -> tuple[
     mostly = f" Most of them are in frames {', '.join(map(str, wrong))}: ids of positions and forces differ there." if (
         len(wrong)) else ""  # fmt: skip
     kept = ForceReadings(*(getattr(readings, each.name)[~distant] for each in fields(ForceReadings)))
-    return kept, f"{int(distant.sum())} forces between discs that lie apart are left out.{mostly}"
+    return kept, f"Left out: {state_count(int(distant.sum()), 'force')} between discs that lie apart.{mostly}"
 
 
 def true_wall_forces(
@@ -162,7 +163,11 @@ def true_wall_forces(
     columns: dict[str, list[object]] = {name: [] for name in ("frame", "i", "j", "fn", "ft", "fn_i", "fn_j")}
     at_wall = np.flatnonzero(readings.other == WALL)
     if walls is None or not len(at_wall):
-        left = f"{len(at_wall)} forces on walls are left out: no walls are given." if len(at_wall) else ""
+        left = (
+            f"Left out, since no walls are given: {state_count(len(at_wall), 'force')} on walls."
+            if len(at_wall)
+            else ""
+        )
         return columns, left
     number = {int(value): k for k, value in enumerate(imported.number)}
     grain = {int(value): k for k, value in enumerate(imported.tracks.id)}
@@ -178,7 +183,7 @@ def true_wall_forces(
         for name, value in zip(columns, (frame, int(readings.disc[s]), wall, fn, ft, fn, ""), strict=True):
             columns[name].append(value)
     left = len(at_wall) - len(columns["frame"])
-    return columns, f"{left} forces on walls of discs that touch two are left out." if left else ""
+    return columns, f"Left out: {state_count(left, 'force')} on walls of discs that touch two." if left else ""
 
 
 def _read_by_photograph(files: list[Path]) -> tuple[Observations, ForceReadings]:
@@ -217,7 +222,7 @@ def _read_all(folder: Path) -> tuple[Observations, ForceReadings]:
     contacts[contacts[:, 2] < 0, 2] = WALL
     known = np.isin(contacts[:, 1], table[:, 1]) & np.isin(contacts[:, 2], [WALL, *table[:, 1]])
     if not known.all():
-        remarks.append(f"{int((~known).sum())} forces of discs without a position are left out.")
+        remarks.append(f"Left out: {state_count(int((~known).sum()), 'force')} of discs without a position.")
     whole = _whole_numbers(folder / CONTACTS, contacts[known, :3].ravel(), "frame, i or j").reshape(-1, 3)
     side = ForceReadings(whole[:, 0], whole[:, 1], whole[:, 2], contacts[known, 4], contacts[known, 3])
     side = _keep_between_two(side, remarks)
@@ -228,7 +233,7 @@ def _keep_between_two(readings: ForceReadings, remarks: list[str]) -> ForceReadi
     """Leave out forces of a disc on itself and copies of readings; what is left out is added to the remarks."""
     own = readings.disc == readings.other
     if own.any():
-        remarks.append(f"{int(own.sum())} forces of discs on themselves are left out.")
+        remarks.append(f"Left out: {state_count(int(own.sum()), 'force')} of discs on themselves.")
         readings = ForceReadings(*(getattr(readings, each.name)[~own] for each in fields(ForceReadings)))
     readings, remark = without_copies(readings)
     remarks += [remark] if remark else []
@@ -272,7 +277,9 @@ def _read_matrices(folder: Path, stem: str, count: int) -> Bonds | None:
     tangential = _numbers(files[1], 1) if files[1].exists() else np.zeros_like(normal)
     for file, matrix in zip(files, (normal, tangential), strict=True):
         if matrix.shape != (count, count):
-            raise InputError(file, "", f"is {matrix.shape[0]} by {matrix.shape[1]}, but there are {count} discs")
+            raise InputError(
+                file, "", f"is {matrix.shape[0]} by {matrix.shape[1]}, but there are {state_count(count, 'disc')}"
+            )
     disc, other = np.nonzero(normal)
     return disc, other, normal[disc, other], tangential[disc, other]
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...experiment.reading.tables import GREATEST, Table
+from ...process.counts import state_count
 from ...process.errors import InputError
 from .foreign_table import column_names, read_foreign
 from .observations import Observations
@@ -55,7 +56,7 @@ def observe_table(
     if not kept.any():
         raise InputError(table.file, f"column {columns['id']}", "is empty: no row belongs to a grain")
     if unnamed := int((~kept).sum()):
-        remarks = (*remarks, f"{unnamed} rows without a grain ({columns['id']} is empty) are left out.")
+        remarks = (*remarks, f"Left out: {state_count(unnamed, 'row')} without a grain ({columns['id']} is empty).")
         table = table.select(kept)
     angle = table.optional_numbers(columns.get("theta", ""))
     radius = table.optional_numbers(columns.get("radius", ""))
@@ -110,7 +111,7 @@ def read_rodtracker(file: Path, columns: Mapping[str, str]) -> Observations:
         "meaningful only if rods are seen end on.",
     ]
     if missing := int((~kept).sum()):
-        remarks.append(f"{missing} rows give no position of a rod.")
+        remarks.append(f"Without a position of a rod: {state_count(missing, 'row')}.")
     return Observations(
         table, number, frame_numbers(table, "frame"), name, 0.5 * (ends_of_rods[:, :2] + ends_of_rods[:, 2:]),
         np.arctan2(along[:, 1], along[:, 0]), radius, remarks=tuple(remarks),

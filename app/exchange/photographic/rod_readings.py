@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...experiment.experiment import GrainGuess
+from ...process.counts import state_count
 from ...process.errors import InputError
 from ...solver.bodies.grains import Array
 from ..foreign.foreign_table import column_names, read_foreign
@@ -85,8 +86,8 @@ def rods_of_labels(labels: NDArray[np.integer]) -> tuple[GrainGuess, list[str]]:
     angular = region & ~speck & (area < ROUND * np.pi * extent**2)
     kept = region & ~speck & ~angular
     remarks = [
-        f"{int(which.sum())} regions of the label image are left out, since they {reason}."
-        for which, reason in ((speck, f"have fewer than {LEAST_AREA} pixels"), (angular, "are not round"))
+        f"Left out: {state_count(int(which.sum()), 'region')} of the label image {reason}."
+        for which, reason in ((speck, f"with fewer than {LEAST_AREA} pixels"), (angular, "without a round outline"))
         if which.any()
     ]
     radius = np.sqrt(area / np.pi)
@@ -138,6 +139,10 @@ def _read_table(file: Path) -> tuple[GrainGuess, list[str]]:
         first = number == number.min()
     area = table.numbers("Area") if "Area" in names else 0.25 * np.pi * table.numbers("Major") * table.numbers("Minor")
     x, y = (table.numbers(name)[first] - 0.5 for name in centre)  # ImageJ counts from the corner of the first pixel
-    remarks = [] if first.all() else [f"{int((~first).sum())} rows of later slices are not used: rods are followed."]
+    remarks = (
+        []
+        if first.all()
+        else [f"Not used, since rods are followed: {state_count(int((~first).sum()), 'row')} of later slices."]
+    )
     radius = np.sqrt(area[first] / np.pi)
     return GrainGuess(np.arange(len(x)), x, y, radius), remarks

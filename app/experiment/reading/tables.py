@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...process.atomic import replacing
+from ...process.counts import state_count
 from ...process.errors import InputError
 from .column_names import refuse_likely_names
 from .input_files import InputFiles
@@ -209,7 +210,7 @@ def check_frames(table: Table, frame: NDArray[np.int64]) -> int:
 def check_frame_count(table: Table, content: str, found: int, expected: int) -> None:
     """Raise InputError where a table does not have as many frames as the experiment; content: its rows in a word."""
     if found != expected:
-        given, there = ("1 frame" if count == 1 else f"{count} frames" for count in (found, expected))
+        given, there = (state_count(count, "frame") for count in (found, expected))
         verb = "is" if expected == 1 else "are"
         raise InputError(table.file, "frame", f"has {content} of {given}, but there {verb} {there}")
 

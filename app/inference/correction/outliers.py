@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...process.counts import state_count
 from ...solver.bodies.grains import Array
 from ...solver.bodies.rods import RodMaterial
 from ...solver.bodies.walls import Walls
@@ -49,10 +50,9 @@ def remove_outliers(tracks: Tracks, walls: WallTracks | None = None) -> tuple[Tr
     count = int(outlier.sum())
     if not count:
         return tracks, ""
-    frames = int(outlier.any(axis=1).sum())
-    remark = (
-        f"{count} poses in {frames} photographs jump against their neighbours: they count as lost; check these rods"
-    )
+    poses, frames = state_count(count, "pose"), state_count(int(outlier.any(axis=1).sum()), "photograph")
+    verbs = ("jumps", "it counts") if count == 1 else ("jump", "they count")
+    remark = f"{poses} in {frames} {verbs[0]} against the neighbours: {verbs[1]} as lost; check these rods"
     return without_poses(tracks, outlier), remark
 
 

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from ...process.counts import state_count
 from ...solver.bodies.rods import RodMaterial
 from ...solver.inferred.interpolated_poses import interpolate_poses, settle_poses
 from ...tracks import Tracks, TrackStatus, WallTracks
@@ -52,8 +53,9 @@ def interpolate_short_gaps(tracks: Tracks, walls: WallTracks | None = None) -> t
         )
         status[k, gaps[k]] = TrackStatus.INTERPOLATED
         sigma[k, gaps[k]] = noise
-    frames = int(gaps.any(axis=1).sum())
-    remark = f"{count} lost poses in {frames} photographs are interpolated between the photographs before and after"
+    poses, frames = state_count(count, "lost pose"), state_count(int(gaps.any(axis=1).sum()), "photograph")
+    verb = "is" if count == 1 else "are"
+    remark = f"{poses} in {frames} {verb} interpolated between the photographs before and after"
     return replace(tracks, position=position, rotation=rotation, sigma=sigma, status=status), remark
 
 

@@ -14,6 +14,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
+from ...process.counts import state_count
 from ..look import entities
 from ..look.canvas import Canvas
 from ..look.colours import BACKGROUND, INK, OUTLINE, Rgba
@@ -60,11 +61,12 @@ def _facts(known: dict[str, Value]) -> list[str]:
     """Return the main results of a run, a few words each."""
     facts = []
     if {"experiment:frames", "experiment:grains"} <= set(known):
-        facts.append(f"{known['experiment:grains']} grains, {known['experiment:frames']} photographs")
+        counted = (("experiment:grains", "grain"), ("experiment:frames", "photograph"))
+        facts.append(", ".join(state_count(int(known[name] or 0), noun) for name, noun in counted))
     frames, fraction = known.get("experiment:frames"), known.get("outcome:settled_share")
     if isinstance(frames, int) and isinstance(fraction, float):
         suspect = known.get("outcome:suspect_frames") or 0
-        facts.append(f"{round(fraction * frames)} frames settled, {suspect} suspect")
+        facts.append(f"{state_count(round(fraction * frames), 'frame')} settled, {suspect} suspect")
     median, least = known.get("outcome:trust_median"), known.get("outcome:trust_least")
     if isinstance(median, float) and isinstance(least, float):
         facts.append(f"trust {median:.2f} (least {least:.2f})")

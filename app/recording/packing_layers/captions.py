@@ -6,6 +6,7 @@ import numpy as np
 import rerun as rr
 
 from ...drawing.frame_caption import caption_of_strain, caption_of_time, caption_of_trust
+from ...process.counts import state_count
 from ...solver.frame_forces import FrameForces, FrameStatus
 from ...solver.statistics.frame_statistics import FrameStatistics
 from ..look import entities
@@ -26,7 +27,7 @@ def log_caption(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     ])  # fmt: skip
     if clock.last > clock.first:
         clock.start()
-        text = f"{when}\n{forces.history.count} sweeps: not yet the reported field"
+        text = f"{when}\n{state_count(forces.history.count, 'sweep')}: not yet the reported field"
         log_texts(clock, entities.CAPTION, [(place, printable(text), INK)], static=False)
     clock.end()
     colour = SUSPECT if forces.status in (FrameStatus.SUSPECT, FrameStatus.FAILED) else INK
@@ -52,7 +53,7 @@ def write_card(scene: Scene, forces: FrameForces, statistics: FrameStatistics, t
     values = [
         f"φ {angle:.1f}°" + (f" ± {angle_sd:.1f}°" if _known(angle_sd) else ""),
         f"z {statistics.coordination_number:.2f}",
-        f"{statistics.contact_count} contacts",
+        state_count(statistics.contact_count, "contact"),
         f"mean f_n {statistics.mean_fn:.3g} {scene.force_unit}",
         f"scale of all forces ± {100.0 * forces.scale_sd:.0f} %" if _known(forces.scale_sd) else "",
     ]
@@ -61,7 +62,9 @@ def write_card(scene: Scene, forces: FrameForces, statistics: FrameStatistics, t
     lost = scene.tracks.id[scene.tracks.frame(forces.frame).lost[0]].tolist()
     lines = [head + expected + ".", ", ".join(each for each in values if each) + "."]
     if lost:
-        lines.append(f"{len(lost)} rods are lost: {', '.join(map(str, lost[:12]))}{' …' if len(lost) > 12 else ''}.")
+        lines.append(
+            f"Lost: {state_count(len(lost), 'rod')}: {', '.join(map(str, lost[:12]))}{' …' if len(lost) > 12 else ''}."
+        )
     listed = list(dict.fromkeys(each for each in [*reasons, *penalties] if each))
     if listed:
         lines.append("What lowers the trust:\n\n" + "\n".join(f"- {each}" for each in listed))

@@ -11,6 +11,7 @@ import numpy as np
 import rerun as rr
 
 from ...drawing.uncertainty import SURE
+from ...process.counts import state_count
 from ...results.results import setting
 from ...solver.bodies.grains import Array
 from ...solver.frame_forces import FrameForces, FrameStatus
@@ -112,11 +113,13 @@ def _counts(scene: Scene, frames: list[FrameSummary]) -> str:
     loads = f"loaded: {pressures}" if pressures else f"none loaded: {scale}"
     length_given = setting(scene.configuration, "material", "length") is not None
     return (
-        f"{scene.tracks.frame_count} frames, {scene.grains.count} rods of {1e3 * scene.rod_length:g} mm"
+        f"{state_count(scene.tracks.frame_count, 'frame')}, {state_count(scene.grains.count, 'rod')} of "
+        f"{1e3 * scene.rod_length:g} mm"
         f"{'' if length_given else ' (assumed length: the configuration gives none)'}, "
-        f"{walls.count} wall{'s' * (walls.count != 1)} "
+        f"{state_count(walls.count, 'wall')} "
         f"({loads}), "
-        f"friction {scene.friction:g}. {sum(f.sweeps for f in frames)} sweeps in {len(frames)} frames."
+        f"friction {scene.friction:g}. {state_count(sum(f.sweeps for f in frames), 'sweep')} in "
+        f"{state_count(len(frames), 'frame')}."
     )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
+from ...process.counts import state_count
 from ...process.errors import InputError
 from ...process.frame_range import FrameRange
 from ...solver.bodies.grains import Array
@@ -170,7 +171,7 @@ def print_score(console: Console, score: VerdictScore, fitted: ThresholdFit | No
         soft_wrap=True,
     )
     if score.disputed:
-        console.print(f"{score.disputed} pairs are disputed or unsure and are not counted.", highlight=False)
+        console.print(f"Disputed or unsure, and not counted: {state_count(score.disputed, 'pair')}.", highlight=False)
     curve = Table(title="Touching below a gap of", box=None, header_style="bold")
     for heading in ("gap [µm]", "precision", "recall", "F1"):
         curve.add_column(heading, justify="right")
@@ -180,9 +181,9 @@ def print_score(console: Console, score: VerdictScore, fitted: ThresholdFit | No
     console.print(curve)
     if fitted is not None:
         console.print(
-            f"Recommended from {fitted.contacts} contacts and {fitted.others} others: threshold "
-            f"{1e6 * fitted.threshold:.1f} µm (with estimator nlgs contacts.threshold={fitted.threshold:.4g}, or "
-            f"contacts.threshold_sigmas={fitted.threshold_sigmas:.3g}). Radius correction "
+            f"Recommended from {state_count(fitted.contacts, 'contact')} and {state_count(fitted.others, 'other')}: "
+            f"threshold {1e6 * fitted.threshold:.1f} µm (with estimator nlgs contacts.threshold="
+            f"{fitted.threshold:.4g}, or contacts.threshold_sigmas={fitted.threshold_sigmas:.3g}). Radius correction "
             f"{1e6 * fitted.radius_change:+.2f} ± {1e6 * fitted.radius_change_sd:.2f} µm on every grain; with it the "
             f"threshold is {1e6 * fitted.threshold_with_change:.1f} µm.",
             highlight=False,

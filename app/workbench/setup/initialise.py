@@ -21,6 +21,7 @@ from ...experiment.pictures.image import FULL_SCALE, Channel, Image, ImageSelect
 from ...experiment.pictures.picture_file import read_photograph
 from ...experiment.plausibility import rods_cut_by_walls
 from ...process.atomic import write_atomically
+from ...process.counts import state_count
 from ...process.errors import InputError
 from ...process.frame_range import ALL_FRAMES, FrameRange
 from ...solver.bodies.wall_shapes import STRAIGHT
@@ -341,7 +342,7 @@ def _find_rods_and_walls(
             edits.set_walls(draft, found, whole, "walls that cut through no rod")
             found = validate(draft)
             notes += [
-                f"Wall {name!r} is left out, since it would cut through {count} rod{'s' if count > 1 else ''}."
+                f"Wall {name!r} is left out, since it would cut through {state_count(count, 'rod')}."
                 for name, count in cut.items()
             ]
         find_discs(draft, first, found)

@@ -45,7 +45,7 @@ def test_a_jump_for_one_photograph_counts_as_lost(frame):
     assert found.status[frame, ROD] == TrackStatus.LOST
     others = np.arange(N) != ROD
     assert np.array_equal(found.position[:, others], tracks.position[:, others])
-    assert "1 poses in 1 photographs" in remark
+    assert "1 pose in 1 photograph jumps" in remark
 
 
 @pytest.mark.parametrize("frame", [0, 3, FRAMES - 1])

@@ -64,7 +64,7 @@ def test_contacts_of_bodies_in_one_run_only_are_left_out_with_a_note(results):
         contacts = results.frames[k].contacts
         kept = contacts.key[(contacts.i != 3) & (contacts.j != 3)]
         assert frame.contacts.key.tolist() == kept.tolist()
-    assert any("left out" in note for note in comparison.notes)
+    assert any("Left out" in note for note in comparison.notes)
 
 
 def test_runs_over_different_frames_are_compared_where_they_overlap(results):

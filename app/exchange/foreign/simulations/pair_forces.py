@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ....process.counts import state_count
 from ....process.errors import InputError
 from ....solver.bodies.cell import Cell
 from ....solver.bodies.grains import Array
@@ -149,7 +150,9 @@ def contacts_of_pairs(
             columns[name].append(value)
     remarks = []
     if left_out:
-        remarks.append(f"{left_out} pair forces are left out: they name neither a grain of this frame nor a wall.")
+        remarks.append(
+            f"Left out: {state_count(left_out, 'pair force')} naming neither a grain of the frame nor a wall."
+        )
     if walls is not None and columns["j"] and not set(columns["j"]) & set(walls.name):
         remarks.append("No pair force is at a wall: scores count the inferred forces at walls as absent in the truth.")
     return columns, remarks

@@ -78,7 +78,7 @@ def test_trackmate_spots_with_four_rows_of_header(tmp_path, capsys):
     (tmp_path / "spots.csv").write_text(SPOTS)
     printed = import_files(capsys, "trackmate", tmp_path / "spots.csv", tmp_path / "out")
     expect_pair(tmp_path / "out", np.array([2e-3, 0.0, 4e-4]), 1e-3)
-    assert "1 rows without a grain" in printed
+    assert "1 row without a grain" in printed
 
 
 def test_trackmate_session_and_simple_tracks(tmp_path, capsys):
@@ -117,7 +117,7 @@ def test_trackmate_table_of_results_saved_by_imagej(tmp_path, capsys):
     assert "--pixel-size" in refuse(capsys, *arguments)
     printed = import_files(capsys, *arguments, "--pixel-size", PIXEL)
     expect_pair(tmp_path / "out", np.array([10.0, 0.0, 2.0]) * PIXEL, 5 * PIXEL)
-    assert "1 rows without a grain" in printed
+    assert "1 row without a grain" in printed
 
 
 def test_rodtracker_ends_of_the_first_camera(tmp_path, capsys):
@@ -137,7 +137,7 @@ def test_rodtracker_ends_of_the_first_camera(tmp_path, capsys):
     assert tracks.position[1, 1] / PIXEL == pytest.approx([20.0, 2.0])
     assert tracks.rotation[0] == pytest.approx([0.0, 0.5 * np.pi])
     assert "Camera gp3" in printed
-    assert "1 rows give no position" in printed
+    assert "Without a position of a rod: 1 row." in printed
     assert "red-1" in (tmp_path / "out" / "ids.csv").read_text()
 
 

@@ -37,7 +37,7 @@ def test_a_dump_local_is_the_truth_in_the_sign_of_compression(tmp_path):
     found = rodsight.import_table(grains, tmp_path / "out", roles, form="lammps", pairs=pairs, walls="box")
     truth = pd.read_csv(tmp_path / "out/truth_contacts.csv")
     assert truth.to_numpy().tolist() == [[1, 1, 2, 5.0, 2.0]]
-    assert any("1 pair forces are left out" in each for each in found.attrs["remarks"])
+    assert any("Left out: 1 pair force naming" in each for each in found.attrs["remarks"])
     assert 'truth = "truth_contacts.csv"' in (tmp_path / "out/experiment.toml").read_text()
 
 
@@ -114,4 +114,4 @@ def test_a_table_names_walls(tmp_path):
     assert truth[["i", "j"]].to_numpy().tolist() == [["1", "bottom"], ["2", "bottom"]]
     assert truth["fn"].tolist() == pytest.approx([4.0, 3.0])
     assert truth["ft"].tolist() == pytest.approx([0.0, -0.5])
-    assert any("1 pair forces are left out" in each for each in found.attrs["remarks"])
+    assert any("Left out: 1 pair force naming" in each for each in found.attrs["remarks"])

@@ -45,7 +45,7 @@ def test_both_readings_of_a_contact_are_stored_beside_their_mean(tmp_path, capsy
     rise = tracks.position[1, 2] - tracks.position[0, 2]
     assert rise == pytest.approx([0.0, PIXEL])
     assert "pixel size is unknown" in printed
-    assert "4 measured forces are in truth_contacts.csv" in printed
+    assert "In truth_contacts.csv: 4 measured forces." in printed
     config = load_experiment(tmp_path / "out").config
     assert config.material.stiffness == "estimate"
     assert config.boundary is not None
@@ -76,9 +76,9 @@ def test_lists_of_all_photographs(tmp_path, capsys):
     rows = truth_in(tmp_path / "out")
     assert [(row["frame"], row["i"], row["j"]) for row in rows] == [("0", "1", "2"), ("1", "2", "3")]
     assert float(rows[0]["fn"]) == pytest.approx(0.4)
-    assert "1 forces on walls are left out" in printed
-    assert "1 forces of discs on themselves are left out" in printed
-    assert "1 forces of discs without a position are left out" in printed
+    assert "Left out, since no walls are given: 1 force on walls." in printed
+    assert "Left out: 1 force of discs on themselves." in printed
+    assert "Left out: 1 force of discs without a position." in printed
 
 
 def test_forces_on_walls_belong_to_the_nearest_one(tmp_path, capsys):
@@ -93,7 +93,7 @@ def test_forces_on_walls_belong_to_the_nearest_one(tmp_path, capsys):
     ]  # fmt: skip
     assert [float(row["fn"]) for row in rows] == pytest.approx([0.5, 0.9, 0.7])
     assert float(rows[1]["ft"]) == pytest.approx(-0.02)
-    assert "2 forces on walls of discs that touch two are left out" in printed
+    assert "Left out: 2 forces on walls of discs that touch two." in printed
     load_experiment(tmp_path / "out")
     assert "5 forces" not in printed
 
@@ -136,7 +136,7 @@ def test_discs_that_the_file_puts_at_the_edge_are_the_boundary(tmp_path, capsys)
     rows = [f"{frame},{k},{60 * (k % 4)},{60 * (k // 4)},30,{int(k % 4 == 0)}" for frame in (1, 2) for k in range(12)]
     (tmp_path / "particle_positions.txt").write_text("\n".join(rows) + "\n")
     printed = import_files(capsys, "pegs", tmp_path, tmp_path / "out")
-    assert "The 3 grains at the edge" in printed
+    assert "By the file, 3 grains at the edge form the boundary" in printed
     assert (tmp_path / "out/boundary.csv").read_text().split() == ["id", "0", "4", "8"]
     assert load_experiment(tmp_path / "out").config.boundary.grains == "boundary.csv"
     import_files(capsys, "pegs", tmp_path, tmp_path / "outer", "--walls", "outer")
@@ -154,5 +154,5 @@ def test_forces_between_discs_that_lie_apart_are_left_out_and_their_frames_named
     assert [(row["frame"], row["i"], row["j"]) for row in truth_in(tmp_path / "out")] == [
         ("0", "1", "2"), ("0", "2", "3"), ("1", "3", "4"),
     ]  # fmt: skip
-    assert "3 forces between discs that lie apart are left out" in printed
+    assert "Left out: 3 forces between discs that lie apart." in printed
     assert "Most of them are in frames 1: ids of positions and forces differ there" in printed

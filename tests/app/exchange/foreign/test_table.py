@@ -51,7 +51,7 @@ def test_every_separator_and_decimal_mark_is_read(tmp_path, capsys, separator, s
     )  # fmt: skip
     expect_rows(tmp_path / "out")
     assert "they were 5 … 7" in printed
-    assert "1 poses lost" in printed
+    assert "1 pose lost" in printed
     assert "ids.csv" in printed
     assert "Jumps by 2π were removed" in printed
     assert "add [walls]" in printed

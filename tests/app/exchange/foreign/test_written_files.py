@@ -80,7 +80,7 @@ def test_rodtracker_files_are_imported(tmp_path, capsys):
         "--walls", "box",
     )  # fmt: skip
     assert "Camera gp3" in printed
-    assert "1 rows give no position of a rod" in printed
+    assert "Without a position of a rod: 1 row." in printed
     assert "500 … 502" in printed
     tracks = tracks_in(tmp_path / "out")
     position = tracks.position / 1e-4

@@ -44,9 +44,9 @@ def test_specks_and_bars_are_left_out_and_counted():
     image[120:124, 20:100] = 9
     rods, remarks = rods_of_labels(image)
     assert rods.id.tolist() == [3, 7, 300]
-    assert [each.split()[0] for each in remarks] == ["1", "1"]
+    assert [each.split()[:4] for each in remarks] == [["Left", "out:", "1", "region"]] * 2
     assert "pixels" in remarks[0]
-    assert "not round" in remarks[1]
+    assert "without a round outline" in remarks[1]
 
 
 @pytest.mark.parametrize("form", ["area", "axes"])
@@ -62,7 +62,7 @@ def test_a_table_of_imagej_is_read_for_its_first_slice(tmp_path, form):
     rods, remarks = read_rods(file, SHAPE)
     assert rods.id.tolist() == [0, 1, 2]
     assert_places(rods)
-    assert remarks == ["3 rows of later slices are not used: rods are followed."]
+    assert remarks == ["Not used, since rods are followed: 3 rows of later slices."]
 
 
 def test_what_holds_no_rods_of_these_photographs_is_refused(tmp_path):
