@@ -182,8 +182,6 @@ def export(
     for name in options:
         if name not in ExportOptions.__annotations__:
             raise InputError("export", name, f"is not an option: there are {', '.join(ExportOptions.__annotations__)}")
-    if "formats" in options and isinstance(options["formats"], str):
-        options["formats"] = (options["formats"],)
     check_options(what, options)
     target = None if out is None else Path(out)
     if run.file is None and (target is None or what in (*DRAWN, FIGURES)):
@@ -200,8 +198,9 @@ def export(
         return draw_pictures(drawing, target, shown_progress(), film=what == "video")
     if what == FIGURES:
         assert run.file is not None
-        formats, width = options.get("formats", ("pdf", "svg")), options.get("width", "single")
-        return write_run_figures(run.file, target, formats, options.get("frame"), width)
+        formats: Any = options.get("formats", ("pdf", "svg"))
+        given: Any = (formats,) if isinstance(formats, str) else tuple(formats)
+        return write_run_figures(run.file, target, given, options.get("frame"), options.get("width", "single"))
     if target is None:
         assert run.file is not None
         target = run.file.parent / what

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from numbers import Real
 from pathlib import Path
 from typing import get_args
 
@@ -52,7 +51,9 @@ class ImportRequest:
             raise InputError("import", repr(self.form), f"is not a form: there are {', '.join(get_args(FileFormat))}")
         for name in ("pixel_size", "interval", "precision", "height", "radius", "corner_radius"):
             value = getattr(self, name)
-            if value is not None and not (isinstance(value, Real) and math.isfinite(value) and value > 0.0):
+            if value is not None and not (
+                isinstance(value, int | float | np.number) and math.isfinite(value) and value > 0.0
+            ):
                 raise InputError(f"--{name.replace('_', '-')}", str(value), "is not positive")
 
 
