@@ -199,7 +199,7 @@ def export(
     if what == FIGURES:
         assert run.file is not None
         formats: Any = options.get("formats", ("pdf", "svg"))
-        given = (formats,) if isinstance(formats, str) else tuple(formats)
+        given: Any = (formats,) if isinstance(formats, str) else tuple(formats)
         return write_run_figures(run.file, target, given, options.get("frame"), options.get("width", "single"))
     if target is None:
         assert run.file is not None
