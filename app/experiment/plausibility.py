@@ -78,10 +78,10 @@ def check_packing(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> 
     ]
 
 
-def check_radii(sources: PackingSources, tracks: Tracks) -> None:
+def check_radii(sources: PackingSources, tracks: Tracks, *, packed: bool = True) -> None:
     """Raise InputError where nearest neighbours are not about the sum of two radii apart, since packed rods touch.
 
-    Typical causes are diameters given as radii, a wrong unit or a wrong scale.
+    Typical causes are diameters given as radii, a wrong unit or a wrong scale. packed: False: grains need not touch.
     """
     file, key = sources.radii
     middle = float(np.median(tracks.radius))
@@ -101,7 +101,7 @@ def check_radii(sources: PackingSources, tracks: Tracks) -> None:
             f"{tracks.radius[largest]:g} m, and all centres lie within {across:.3g} m",
         )  # fmt: skip
     spacing = neighbour_spacing(tracks.position[0][tracks.present[0]], tracks.radius[tracks.present[0]])
-    if len(spacing) and not SPACING[0] <= (found := float(np.median(spacing))) <= SPACING[1]:
+    if packed and len(spacing) and not SPACING[0] <= (found := float(np.median(spacing))) <= SPACING[1]:
         state = "overlap" if found < 1.0 else "stand apart"
         raise InputError(
             file, key, f"does not fit the positions: neighbours {state}, their distance is {found:.2f} times "

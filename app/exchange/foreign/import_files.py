@@ -80,9 +80,12 @@ def import_files(request: ImportRequest, folder: Path) -> tuple[ImportedTracks, 
     precision = foreign.precision_of(request.precision)
     imported = make_tracks(foreign.observed, convention, precision)
     stated = None if request.precision is None else ("--precision", f"{precision:g} m")
-    check_radii(PackingSources((request.source, _origin_of_radii(request)), stated, {}), imported.tracks)
     discs = None if corners is None else make_corners(corners, imported, convention, request.corner_radius)
     contents = replace(_folder_contents(request, foreign, imported, convention), corners=discs)
+    boundaries = (contents.walls, contents.corners, contents.cell)
+    bounded = contents.outer_grains or bool(contents.edge) or any(each is not None for each in boundaries)
+    sources = PackingSources((request.source, _origin_of_radii(request)), stated, {})
+    check_radii(sources, imported.tracks, packed=bounded)  # else no forces are solved
     if foreign.truth is not None:
         contents, imported = _with_measured_forces(foreign.truth, contents, imported)
     if request.pairs is not None:

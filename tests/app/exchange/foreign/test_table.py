@@ -219,3 +219,12 @@ def test_inconsistent_options_are_refused(tmp_path, capsys):
     assert "there is no such file" in refuse(capsys, *arguments, "--walls", tmp_path / "none.csv")
     import_files(capsys, *arguments)
     assert "already exists" in refuse(capsys, *arguments)
+
+
+def test_grains_without_a_boundary_need_not_touch(tmp_path, capsys):
+    file = tmp_path / "gas.csv"
+    file.write_text("frame,id,x,y,r\n" + "".join(f"0,{k},{0.1 * k},{0.07 * k * k},0.004\n" for k in range(9)))
+    columns = ("--columns", "frame=frame,id=id,x=x,y=y,radius=r")
+    assert "stand apart" in refuse(capsys, "table", file, tmp_path / "out", *columns, "--walls", "box")
+    import_files(capsys, "table", file, tmp_path / "out", *columns)
+    assert tracks_in(tmp_path / "out").id.tolist() == list(range(9))
