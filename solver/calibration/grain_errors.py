@@ -12,12 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..bodies.grains import Array
+from ..robust_scale import NORMAL_MEDIAN
 from .derivatives import Derivatives
 from .equations import GapEquations
 from .gap_error_draws import GapErrorDraws
 from .gaps import GapRows, MeasuredSequence
 from .normal_equations import Couplings, NormalEquations
-from .weights import FINAL_SCALE, NORMAL_MEDIAN
+from .weights import FINAL_SCALE
 
 ROUNDS = 6  # of weights and noise
 MIN_NOISE_FACTOR = 0.5  # lower limit: fewer gaps than unknowns fit too well

@@ -28,9 +28,9 @@ from numpy.typing import NDArray
 
 from ..bodies.grains import Array
 from ..bodies.wall_shapes import OUT, STRAIGHT, Sides, all_sides, bounding_distance, circle_ends, circle_parameters
+from ..robust_scale import NORMAL_MEDIAN
 from .gaps import MeasuredSequence, find_gap_rows, measure_gaps
 from .priors import CalibrationPriors
-from .weights import NORMAL_MEDIAN
 
 REACH = 0.06  # of a mean diameter: greatest gap that is used
 COARSE = 1.5e-3  # of a mean diameter: initial kernel width, then reduced to the width of the peak

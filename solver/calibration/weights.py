@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..bodies.grains import Array
+from ..robust_scale import NORMAL_MEDIAN
 
 FINAL_SCALE = 2.0  # final s over the noise of a gap: a smaller one would cut off contacts by their own noise
 MAX_DEPTH = 2.0  # times s: a deeper overlap is a tracking error
-NORMAL_MEDIAN = 0.6745  # median of |N(0, 1)|
 
 
 def contact_width(gap: Array, overlap: float) -> float:

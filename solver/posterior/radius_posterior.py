@@ -15,8 +15,8 @@ from jaxtyping import Float, Int
 from ..bodies.grains import Array
 from ..bodies.motion import Snapshot
 from ..bodies.packing import Packing
-from ..calibration.weights import NORMAL_MEDIAN
 from ..even_subset import even_subset
+from ..robust_scale import NORMAL_MEDIAN
 from .posterior_settings import PosteriorSettings
 from .sampler.chain import ChainMeans, make_sampler_grains, make_sampler_pairs, make_schedule, run_chain
 from .sampler.records import SamplerGrains, SamplerPairs
