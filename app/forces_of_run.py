@@ -8,7 +8,6 @@ from dataclasses import replace
 from .compilation.ahead import SOLVER_KERNELS
 from .experiment.config.experiment_file import as_toml
 from .inference.corrected_sequence import CorrectedSequence
-from .inference.diagnosis.diagnose import diagnose_solved
 from .inference.frame_store import CheckpointStore, FrameStore, SolvedFrame
 from .inference.infer_sequence import FIRST_FRAME, infer_sequence
 from .inference.inputs import Inputs
@@ -47,9 +46,6 @@ def infer_forces(run: Run, inputs: Inputs, origin: Provenance, log: VerdictLog) 
         first = results.frames[0].reason
         raise RunError(f"{run.experiment.file}: no frame could be solved; the first one: {first}{log_file}")
     release_free_memory()
-    results = replace(
-        results, diagnosis=tuple(diagnose_solved(inputs, results, run.progress, undisturbed=observer.undisturbed))
-    )
     results = store_results(run, _named(run, results), origin, log)
     store.checkpoint.clear()
     forget_candidate_gaps()
@@ -68,10 +64,8 @@ class _RunObserver(InferenceObserver):
     def __init__(self, run: Run, log: VerdictLog) -> None:
         super().__init__(run.progress)
         self._run, self._log = run, log
-        self.undisturbed = False  # as of `diagnose`
 
     def corrected(self, sequence: CorrectedSequence) -> None:
-        self.undisturbed = sequence.undisturbed
         self._run.write_manifest(self._log)
         if self._run.watch is not None:
             self._run.watch.start(_named(self._run, sequence.unsolved_results()))

@@ -30,14 +30,6 @@ if TYPE_CHECKING:
     from .tracking.picture_quality import PictureQuality
 
 GOOD, POOR = 0.9, 0.75  # expected r(f_n) from which on nothing is wrong, and below which something is
-CORRECTED = (
-    "exchanged_ids",
-    "outlier_tracks",
-    "missing_poses",
-    "photograph_repeated",
-    "stretched_picture",
-    "lens",
-)  # named causes that a run corrects itself
 MOST_STATED = 0.99  # expected r(f_n)
 # Expected r(f_n) from which on the forces fit the given friction, so that another one is not named: the sliding of few
 # contacts, which one wrong radius can contradict, is weaker evidence.
@@ -75,7 +67,7 @@ class Prediction:
         """
         if self.trial is None:
             return NO_EXPECTATION
-        r, low, high = self.trial.expect(contradicted=any(each.cause not in CORRECTED for each in self.diagnosis))
+        r, low, high = self.trial.expect(contradicted=any(not each.corrected for each in self.diagnosis))
         if any(each.cause == "smoothed_tracks" for each in self.diagnosis):  # estimates share its errors
             r, low = min(r, EXPECTED_OF_SMOOTHED), min(low, LOW_OF_SMOOTHED)
         most = TRUST_OF_FEW if describe_few_photographs(self.trial.photographs) else 1.0

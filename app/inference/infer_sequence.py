@@ -13,6 +13,7 @@ import numpy as np
 
 from ..process.machine.free_memory import release_free_memory
 from ..process.machine.linear_algebra import one_thread_each
+from ..results.finding import Finding
 from ..results.hdf5.lazy_sequences import LazySequence
 from ..results.results import Results
 from ..solver.assessment.fringe_pressures import FringePressures, compare_with_fringes
@@ -20,7 +21,12 @@ from ..solver.assessment.intervals.force_intervals import widen_scale
 from ..solver.assessment.intervals.scale_sd import FIRST_BY_SECOND
 from ..solver.assessment.intervals.statistic_intervals import widen_for_friction
 from ..solver.assessment.intervals.wall_sensors import scale_error
-from ..solver.assessment.penalties import limit_by_intervals, limit_for_few_photographs, penalise_friction
+from ..solver.assessment.penalties import (
+    limit_by_intervals,
+    limit_for_few_photographs,
+    penalise_contradiction,
+    penalise_friction,
+)
 from ..solver.bodies.motion import Snapshot
 from ..solver.convex.friction_check import FrictionCheck
 from ..solver.frame_forces import FrameForces, FrameStatus
@@ -30,6 +36,8 @@ from ..solver.statistics.frame_statistics import FrameStatistics
 from .corrected_sequence import CorrectedSequence
 from .correction.correct_sequence import correct_sequence
 from .correction.friction import check_sequence_friction
+from .diagnosis.causes import uncorrected
+from .diagnosis.diagnose import diagnose_solved
 from .diagnosis.smoothed_tracks import find_smoothing, limit_for_smoothing
 from .first_frame import estimate_first_frame
 from .frame_store import FrameStore, MemoryStore
@@ -46,6 +54,7 @@ def infer_sequence(
     store: FrameStore | None = None,
     *,
     complete: bool = True,
+    diagnosis: Sequence[Finding] | None = None,
 ) -> Results:
     """Infer the contact forces of all frames from tracks.
 
@@ -58,8 +67,10 @@ def infer_sequence(
     store : FrameStore, optional
         Keeps solved frames; frames that it holds already are not solved again. Default: in memory.
     complete : bool
-        Whether all photographs are there. Without it the estimate of the first frame from all others and the friction
-        check are left out.
+        Whether all photographs are there. Without it the estimate of the first frame from all others, the friction
+        check and the diagnosis are left out.
+    diagnosis : sequence of Finding, optional
+        Causes of wrong forces that are known; None: they are sought.
 
     Returns
     -------
@@ -100,7 +111,7 @@ def infer_sequence(
     assessed = LazySequence(count, assess)
     widened = LazySequence(count, lambda k: _widen_statistics(sequence, statistics[k], assessed[k], check))
     kinematics = _measure_kinematics(sequence)
-    return replace(
+    results = replace(
         unsolved,
         frames=assessed,
         statistics=widened,
@@ -108,6 +119,12 @@ def infer_sequence(
         read_kinematics=lambda: kinematics,
         fringes=_compare_with_fringes(sequence, assessed),
     )
+    if diagnosis is None:
+        release_free_memory()
+        diagnosis = diagnose_solved(inputs, results, observer.progress, undisturbed=sequence.undisturbed)
+    words = "; ".join(f"{each.cause.replace('_', ' ')}: {each.cure}" for each in uncorrected(diagnosis))
+    penalised = LazySequence(count, lambda k: penalise_contradiction(assessed[k], words)) if words else assessed
+    return replace(results, diagnosis=tuple(diagnosis), frames=penalised)
 
 
 def _measure_kinematics(sequence: CorrectedSequence) -> SequenceKinematics | None:

@@ -105,7 +105,8 @@ def what_if(
     inputs = _moved(inputs, frames, move or {})
     if friction is not None:
         inputs = _with_friction(inputs, friction)
-    solved = infer_sequence(inputs, InferenceObserver(shown_progress()))
+    known = stored.diagnosis if friction is None else None  # another friction may be the cure of what was found
+    solved = infer_sequence(inputs, InferenceObserver(shown_progress()), diagnosis=known)
     return Run.in_memory(solved, f"{run.name} (what if)", stored.configuration, inputs)
 
 

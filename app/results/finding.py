@@ -13,6 +13,7 @@ class Finding:
     evidence: str  # in a clause
     effect: str
     cure: str
+    corrected: bool = False  # by the run itself, whose forces then do not suffer
 
     def sentence(self) -> str:
         """State cause, evidence, effect and cure."""
@@ -21,4 +22,4 @@ class Finding:
 
     def as_plain(self) -> dict[str, str]:
         """Return the values of summary.json."""
-        return asdict(self)
+        return {name: value for name, value in asdict(self).items() if isinstance(value, str)}

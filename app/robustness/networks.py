@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..inference.infer_sequence import infer_sequence
 from ..inference.inputs import Inputs
+from ..results.finding import Finding
 from ..solver.bodies.grains import Array
 from ..solver.frame_forces import FrameForces
 from ..solver.statistics.frame_statistics import FrameStatistics
@@ -21,14 +22,16 @@ class VariedInputs(Inputs):
 
     noise: Array  # (f, n) [m] best estimate of the standard deviation of positions
     frames: NDArray[np.int64]  # (f,) these photographs in the nominal run
+    diagnosis: tuple[Finding, ...] = ()  # of the nominal run
 
     @classmethod
-    def of(cls, given: Inputs, noise: Array) -> VariedInputs:
-        """Given inputs without variation; noise (f, n) [m]."""
+    def of(cls, given: Inputs, noise: Array, diagnosis: tuple[Finding, ...] = ()) -> VariedInputs:
+        """Given inputs without variation; noise (f, n) [m]; causes of wrong forces that the nominal run named."""
         frames = np.arange(given.tracks.frame_count)
         return cls(
-            given.tracks, given.walls, given.material, given.settings, given.verdicts, noise=noise, frames=frames
-        )
+            given.tracks, given.walls, given.material, given.settings, given.verdicts, noise=noise, frames=frames,
+            diagnosis=diagnosis,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +70,6 @@ def gather(frame: NDArray[np.int64], forces: Sequence[FrameForces], statistics: 
 
 
 def infer(inputs: VariedInputs) -> Networks:
-    """Infer the forces of varied inputs with the settings of a run."""
-    results = infer_sequence(replace(inputs, settings=inputs.settings.without_sweeps()))
+    """Infer the forces of varied inputs with the settings of a run; what the nominal run named holds for them, too."""
+    results = infer_sequence(replace(inputs, settings=inputs.settings.without_sweeps()), diagnosis=inputs.diagnosis)
     return gather(inputs.frames, list(results.frames), list(results.statistics))

@@ -44,7 +44,7 @@ class Nominal:
         frames = np.arange(inputs.tracks.frame_count)
         bodies = results.grains.count + results.walls.count
         return cls(
-            VariedInputs.of(inputs, results.tracks.sigma),
+            VariedInputs.of(inputs, results.tracks.sigma, results.diagnosis),
             gather(frames, results.frames, results.statistics),
             None if truth is None else truth.by_frame(bodies, len(frames)),
         )

@@ -46,7 +46,7 @@ def measure_accuracy(
             rng = np.random.default_rng([number, start, round(noise * 1e9)])
             inputs = observe(truth, range(start, start + window), noise, rng, estimator=estimator)
             rows = []
-            for frame in infer_sequence(inputs).frames:
+            for frame in infer_sequence(inputs, diagnosis=()).frames:
                 found = agreement_of(frame, truth, start + frame.frame)
                 rows.append((found.r_fn, found.r_ft, found.relative_l2, found.scale))
                 done += 1

@@ -97,7 +97,8 @@ def _solve_all(
         for start in window_starts(truth, window):
             rng = np.random.default_rng([number, start])
             frames = []
-            for frame in infer_sequence(changed(observe(truth, range(start, start + window), NOISE, rng))).frames:
+            inputs = changed(observe(truth, range(start, start + window), NOISE, rng))
+            for frame in infer_sequence(inputs, diagnosis=()).frames:
                 frames.append(frame)
                 done += 1
                 progress(label, done, 2 * window * len(truths))

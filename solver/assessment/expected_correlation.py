@@ -53,7 +53,8 @@ CORRECTED_NOISE = 1.2  # ε of a motion that is noise: at most 1.14 in simulated
 # then above r + .03 in .6 %, as before, and below r − .15 in 13 instead of 22 %.
 CONFIRMED_MARGIN = 0.05
 MOSTLY_OVERLAPS = 0.5  # weight of the position-only estimate of soft grains above which only its evidence counts
-CONTRADICTED: float = FITTED["expected_correlation"]["contradicted"]  # change of a prediction where a cause is named
+CONTRADICTED: float = FITTED["expected_correlation"]["contradicted"]  # change of arctanh r where a cause is named
+CERTAIN = 1.0 - 1e-9  # r up to which arctanh r is finite
 WIDEST: float = FITTED["expected_correlation"]["widest_gap_error"]  # gap error that simulated frames have reached
 CLOSED: float = FITTED["expected_correlation"]["closed_overlap"]  # at which r is half of what other evidence shows
 BEST_EIGHTH = 1  # knot of a table: quantiles of the frames of the fit, an eighth apart
@@ -133,6 +134,11 @@ def predict_correlation(evidence: Sequence[Evidence], *, contradicted: bool = Fa
     shown = float(np.mean([_shown_fraction(each) for each in evidence]))
     r, low, high = (shown * max(math.tanh(each), 0.0) for each in (score, score - sd, score + sd))
     return r, low, high
+
+
+def contradict(correlation: float) -> float:
+    """Lower a correlation, expected or a bound, for a named cause of wrong forces, of which frames show a part only."""
+    return max(math.tanh(math.atanh(min(correlation, CERTAIN)) + CONTRADICTED), 0.0)
 
 
 def confirmed_correlation(evidence: Evidence) -> float:

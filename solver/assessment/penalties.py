@@ -12,7 +12,7 @@ from ..convex.friction_check import COVERAGE_FACTOR, FrictionCheck
 from ..frame_forces import FrameForces, FrameStatus
 from ..statistics.sliding import contact_state, sliding_probability_at
 from .evidence import Evidence
-from .expected_correlation import losses
+from .expected_correlation import contradict, losses
 from .intervals.force_intervals import correlation_by_intervals, widen_for_friction
 from .trust import Assessment, interior_limit, motion_assessment, unseen_penalty
 
@@ -104,6 +104,30 @@ def penalise_friction(frame: FrameForces, check: FrictionCheck | None, *, measur
         )
         penalised = replace(penalised, sliding_probability=slides, state=contact_state(frame.fn, slides))
     return widen_for_friction(penalised, check.given, check.measured)
+
+
+def penalise_contradiction(frame: FrameForces, words: str) -> FrameForces:
+    """Trust a frame less whose input contradicts itself, by evidence of the whole sequence.
+
+    Parameters
+    ----------
+    frame : FrameForces
+    words : str
+        What was found, stated first.
+
+    Returns
+    -------
+    FrameForces
+        With trust and expected correlation of `expected_correlation.contradict`; a frame that failed stays as it is.
+    """
+    if frame.status is FrameStatus.FAILED:
+        return frame
+    return replace(
+        frame,
+        trust=contradict(frame.trust),
+        expected_correlation=contradict(frame.expected_correlation),
+        trust_penalties="; ".join(filter(None, (words, frame.trust_penalties))),
+    )
 
 
 def limit_for_few_photographs(frame: FrameForces, count: int) -> FrameForces:

@@ -65,6 +65,11 @@ class FrictionCheck:
     wall_high: Annotated[float, Quantity("upper end of its interval", since=2)] = float("nan")
 
     @property
+    def given_gap(self) -> float:
+        """Relative power gap of the given friction; NaN without sliding."""
+        return float(np.interp(1.0, self.trial, self.gap)) if len(self.trial) else float("nan")
+
+    @property
     def agrees(self) -> bool:
         """Whether the given friction lies within the interval, or no estimate exists."""
         return not self.enclosed or self.low <= self.given <= self.high

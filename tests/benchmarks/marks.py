@@ -69,7 +69,7 @@ def measure(folder: Path, workers: int, frames: FrameRange) -> dict[str, Any]:
         few = replace(inputs, tracks=inputs.tracks.frames(0, LOADING), walls=inputs.walls.frames(0, LOADING))
         loading = time_once(lambda: infer_sequence(few))
         marks, store = _Marks(), CheckpointStore(lambda: run.checkpoint("solving", "marks"))
-        results = infer_sequence(inputs, marks, store)
+        results = infer_sequence(inputs, marks, store, diagnosis=())
         marks.at.append(_now())
         diagnosing = time_once(lambda: diagnose_solved(inputs, results, undisturbed=marks.undisturbed))
         origin = Provenance("marks", folder.name, frames, {})

@@ -17,6 +17,7 @@ from ...solver.convex.friction_check import (
     COVERAGE_FACTOR,
     FRAMES,
     MIN_WALL_CONTACTS,
+    QUIET,
     WALL_BIAS_SD,
     FrictionCheck,
     WallFriction,
@@ -43,7 +44,6 @@ from ...tracks import Tracks, WallTracks
 from ..corrected_sequence import CorrectedSequence
 from ..snapshots import make_snapshots
 
-DOUBTFUL_GAP = 0.1  # power gap at the best friction above which something else may resist the sliding
 GUESSES = 5  # of the friction, each by the previous one
 SAME_FRICTION = 0.02  # relative change below which the iteration has converged
 POSSIBLE = (0.02, 2.0)  # range of the friction
@@ -80,7 +80,7 @@ def check_sequence_friction(sequence: CorrectedSequence, frames: Sequence[FrameF
     unit = force_scale(packing, ChainSettings())
     probability = sequence.settings.for_radii(packing.grains.radius).ensemble.probability
     check = check_friction(packing, snapshots, first, first + count - 1, unit, probability, sequence.settings.workers)
-    if check is not None and (not check.agrees or float(np.nanmin(check.gap, initial=0.0)) > DOUBTFUL_GAP):
+    if check is not None and (not check.agrees or check.given_gap > QUIET):
         check = _beside_others(check, find_in_sequence(packing, snapshots, first, unit, probability))
     walls = sequence.wall_friction
     if check is None or walls is None:

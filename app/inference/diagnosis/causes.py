@@ -14,6 +14,7 @@ class Cause:
 
     effect: str
     cure: str
+    corrected: bool = False  # by a run itself
 
 
 CAUSES: dict[str, Cause] = {
@@ -24,7 +25,9 @@ CAUSES: dict[str, Cause] = {
         "the motion goes to and fro where the packing did not", "put the photographs in the order of their times"
     ),
     "photograph_repeated": Cause(
-        "no motion leads to the second of both, and its forces rest on the positions alone", "leave one of them out"
+        "no motion leads to the second of both, and its forces rest on the positions alone",
+        "leave one of them out",
+        corrected=True,
     ),
     "smoothed_tracks": Cause(
         "sudden motion is spread over several photographs, and errors that they share seem to be knowledge: forces err "
@@ -63,14 +66,17 @@ CAUSES: dict[str, Cause] = {
     "outlier_tracks": Cause(
         "a rod that jumps for one photograph seems to slide; its pose is interpolated there",
         "look at these rods in these photographs",
+        corrected=True,
     ),
     "exchanged_ids": Cause(
         "a rod seems to jump to another's place, with its radius, or to be lost",
         "a run gives every rod the name under which it was seen first: correct the table of the tracks",
+        corrected=True,
     ),
     "missing_poses": Cause(
         "contacts of rods that photographs lack are interpolated, or missing",
         "find these rods in the photographs",
+        corrected=True,
     ),
     "wall_misplaced": Cause(
         "rods stand beyond a wall, which then carries too much force, or none",
@@ -89,10 +95,12 @@ CAUSES: dict[str, Cause] = {
     "stretched_picture": Cause(
         "rods that touch seem apart in one direction and overlap in the other",
         "calibrate the camera: x and y have different scales; a run removes it as far as the gaps show it",
+        corrected=True,
     ),
     "lens": Cause(
         "rods that touch seem apart in one part of the picture and overlap in another",
         "calibrate the camera (photographs.lens); a run removes it as far as the gaps show it",
+        corrected=True,
     ),
     "all_radii": Cause("contacts are lost or invented", "measure the radii anew, or the pixel size"),
     "class_radii": Cause("contacts of one size of rods are lost or invented", "measure the radii of every size anew"),
@@ -103,6 +111,7 @@ CAUSES: dict[str, Cause] = {
     "exchanged_sizes": Cause(
         "these rods penetrate their neighbours or touch none",
         "a run uses the sizes with which they touch: correct their radii in the table",
+        corrected=True,
     ),
     "sections_not_round": Cause(
         "rods that touch seem apart in some directions and overlap in others",
@@ -115,17 +124,31 @@ CAUSES: dict[str, Cause] = {
     ),
 }
 
+# Causes that the trust of every frame contains already: by its evidence, or by a limit or an interval of their own.
+JUDGED_BY_FRAMES = frozenset({"not_explained", "smoothed_tracks", "wall_forces"})
+
 
 def name_once(findings: Iterable[Finding]) -> list[Finding]:
     """Return one finding for every cause, in order, with all its evidence: two tests may find the same one."""
     found: dict[str, Finding] = {}
     for each in findings:
         known = found.get(each.cause)
-        found[each.cause] = each if known is None else replace(known, evidence=f"{known.evidence}; {each.evidence}")
+        found[each.cause] = (
+            each
+            if known is None
+            else replace(
+                known, evidence=f"{known.evidence}; {each.evidence}", corrected=known.corrected and each.corrected
+            )
+        )
     return list(found.values())
 
 
-def finding(cause: str, evidence: str) -> Finding:
-    """Return a finding with the documented effect and cure of its cause."""
+def finding(cause: str, evidence: str, *, corrected: bool | None = None) -> Finding:
+    """Return a finding with the documented effect and cure of its cause; corrected by a run: None: as documented."""
     known = CAUSES[cause]
-    return Finding(cause, evidence, known.effect, known.cure)
+    return Finding(cause, evidence, known.effect, known.cure, known.corrected if corrected is None else corrected)
+
+
+def uncorrected(findings: Iterable[Finding]) -> list[Finding]:
+    """Return the causes for which forces suffer, and of which the evidence of single frames shows a part only."""
+    return [each for each in findings if not each.corrected and each.cause not in JUDGED_BY_FRAMES]

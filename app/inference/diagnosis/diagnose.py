@@ -20,6 +20,7 @@ from ...results.finding import Finding
 from ...results.results import Results
 from ...solver.assessment.intervals.wall_sensors import contradicting
 from ...solver.bodies.grains import Array
+from ...solver.convex.friction_check import QUIET
 from ..correction.correct_sequence import complete_walls, correct_sequence
 from ..correction.outliers import restore_exchanged_ids
 from ..inputs import Inputs
@@ -47,7 +48,6 @@ from .wall_times import examine_wall_times
 # the model lacks physics that no rival has, the highest rise was 0.13 (seed 40, six scenarios).
 CLEAR, AHEAD = 0.2, 0.1
 DOUBTFUL = 0.93  # expected r of some photographs of a solved test below which rivals are compared
-DOUBTFUL_GAP = 0.1  # least power gap of the friction check above which what resists the sliding is examined
 UNEXPLAINED = 0.85  # expected r below which something is wrong although no cause wins
 FEW_OUTLIERS = 0.003  # fraction of the poses that jump, below which they do not explain poor forces
 GAP_SHOWN = 0.5  # of the mean gap that wrong radii of all hard rods cause: with less they are not wrong
@@ -131,7 +131,8 @@ def _compare_rivals(
     best = _winner(rise)
     if best and best not in excluded:
         gain, words = rise[best]
-        return [finding(best, f"if {words}, what the forces leave unexplained falls to {_remainder(gain)}")]
+        evidence = f"if {words}, what the forces leave unexplained falls to {_remainder(gain)}"
+        return [finding(best, evidence, corrected=False)]  # a run has removed what it could
     worst = trial.worst
     contradicted = bool(worst.words) and not worst.little_known
     return [finding("not_explained", worst.words)] if contradicted and trial.expected[0] < UNEXPLAINED else []
@@ -160,7 +161,7 @@ def diagnose_solved(
         motion leads, and which no trial judges, is no reason.
     """
     check = results.friction_check
-    slides = check is None or not check.agrees or not float(np.nanmin(check.gap, initial=np.inf)) < DOUBTFUL_GAP
+    slides = check is None or not check.agrees or not check.given_gap < QUIET
     expected = np.array([frame.expected_correlation for frame in results.frames])
     window = min(TRIAL_PHOTOGRAPHS, len(expected))
     expected[0] = np.nan
@@ -189,7 +190,7 @@ def _examine_sliding(inputs: Inputs, first: int) -> list[Finding]:
     try:
         sequence = correct_sequence(window)
         # overlaps of soft grains carry their forces: errors of radii or of the camera look like other friction
-        return [] if sequence.settings.soft else examine_resistance(sequence)
+        return [] if sequence.settings.soft else examine_resistance(sequence, used=inputs.settings.resistance)
     except (UndeterminedError, ValueError, FloatingPointError):  # these photographs do not show it
         return []
 

@@ -30,7 +30,9 @@ def undistorted(
     tracks, walls, _, found = correct_camera(
         inputs.material, tracks, walls, failed, radii_known=settings.radii_are_known
     )
-    return tracks, walls, [*named, _name(found)] if found is not None and found.applied else named
+    if found is None or not found.applied:
+        return tracks, walls, named
+    return tracks, walls, [*named, _name(found, corrected=not _overlaps_are_forces(inputs, walls, failed))]
 
 
 def seeks_distortion(inputs: Inputs, walls: WallTracks, failed: Collection[int]) -> bool:
@@ -38,11 +40,16 @@ def seeks_distortion(inputs: Inputs, walls: WallTracks, failed: Collection[int])
     boundary = inputs.settings.boundary
     if boundary is None or not boundary.camera or walls.cell is not None:
         return False
+    return walls.count > 0 or not _overlaps_are_forces(inputs, walls, failed)
+
+
+def _overlaps_are_forces(inputs: Inputs, walls: WallTracks, failed: Collection[int]) -> bool:
+    """Whether grains are soft: a distortion and their overlaps then look alike, and only a part of it is removed."""
     material, _ = assume_softness(inputs.material, inputs.tracks, walls, failed)
-    return walls.count > 0 or material.stiffness in (None, "rigid")
+    return material.stiffness not in (None, "rigid")
 
 
-def _name(found: CameraDistortion) -> Finding:
+def _name(found: CameraDistortion, *, corrected: bool) -> Finding:
     """Name a stretching, or the lens where there is a radial distortion."""
     cause = "stretched_picture" if found.value[ANISOTROPY].any() and not found.radial_change() else "lens"
-    return finding(cause, found.describe()[0])
+    return finding(cause, found.describe()[0], corrected=corrected)

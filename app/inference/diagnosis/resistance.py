@@ -17,13 +17,19 @@ from .data_quality import measure_data_quality
 # Fraction of the contacts that slide beyond noise, from which on causes are named that act where they slide: forces
 # that only push explain the noise of contacts at rest worse than forces of either sign. Sheared packings slide at .2
 # and more; under a rising pressure, or nearly jammed, at less than .06, and there causes were named wrongly.
-LEAST_SLIDING = 0.1
-NEED_SLIDING = ("friction", "wall_friction", "adhesion", "photographs_reversed")
+LEAST_SLIDING = dict.fromkeys(("friction", "wall_friction", "adhesion"), 0.1) | {
+    # The wrong sense of all sliding shows with fewer: at .06 to .1 it lowered what contradicts the sliding to .2 to .5,
+    # and was the best explanation of correct input only where at most .01 slide.
+    "photographs_reversed": 0.05,
+}
 LEAST_NAMED = 0.005  # of the mean force: a lesser drag or attraction explains nothing, whatever else was fitted with it
 
 
-def examine_resistance(sequence: CorrectedSequence) -> list[Finding]:
-    """Name what resists the sliding other than the input states; empty where the input explains it best."""
+def examine_resistance(sequence: CorrectedSequence, *, used: bool = False) -> list[Finding]:
+    """Name what resists the sliding other than the input states; empty where the input explains it best.
+
+    used: whether a run uses the friction of walls or base that it finds.
+    """
     packing, snapshots = sequence.packing, sequence.snapshots
     probability = sequence.settings.for_radii(packing.grains.radius).ensemble.probability
     first = max(1, (len(snapshots) - FRAMES) // 2)
@@ -31,7 +37,7 @@ def examine_resistance(sequence: CorrectedSequence) -> list[Finding]:
     found = find_in_sequence(packing, snapshots, first, unit, probability, sequence.settings.workers)
     if found is None or not found.cause or (found.cause == "friction" and sequence.friction_measured):
         return []
-    if found.cause in NEED_SLIDING and not _slides(sequence):
+    if not _slides(sequence, LEAST_SLIDING.get(found.cause, 0.0)):
         return []
     named = {"base_friction": found.found.base_drag, "adhesion": found.found.attraction}
     if named.get(found.cause, 1.0) < LEAST_NAMED:
@@ -55,13 +61,17 @@ def examine_resistance(sequence: CorrectedSequence) -> list[Finding]:
         ),
     }
     left = f"what contradicts the sliding falls from {100.0 * found.given_gap:.0f} to {100.0 * found.found_gap:.0f} %"
-    return [finding(found.cause, f"{words[found.cause]()}; with that, {left}")]
+    # `sequence` is that of the input as stated; a run uses such a coefficient unless its settings forbid it.
+    corrected = found.cause in ("wall_friction", "base_friction") and used
+    return [finding(found.cause, f"{words[found.cause]()}; with that, {left}", corrected=corrected)]
 
 
-def _slides(sequence: CorrectedSequence) -> bool:
-    """Whether so many contacts slide beyond noise that they can show what resists it."""
+def _slides(sequence: CorrectedSequence, least: float) -> bool:
+    """Whether more than a fraction of the contacts slide beyond noise."""
+    if not least:
+        return True
     quality = measure_data_quality(sequence.tracks, sequence.walls)
-    return quality is not None and quality.sliding > LEAST_SLIDING
+    return quality is not None and quality.sliding > least
 
 
 def _coefficient(sequence: CorrectedSequence, found: Resistance) -> str:

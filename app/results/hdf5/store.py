@@ -9,6 +9,7 @@ import json
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import cast
@@ -53,7 +54,7 @@ def save_results(file: Path, results: Results, origin: Provenance) -> None:
         store.attrs["configuration"] = results.configuration
         store.attrs["friction"] = results.friction
         store.attrs["base_friction"] = results.base_friction
-        store.attrs["diagnosis"] = json.dumps([each.as_plain() for each in results.diagnosis])
+        store.attrs["diagnosis"] = json.dumps([asdict(each) for each in results.diagnosis])
         write_results(store, results)
         for path in DEVIATIONS:
             store[path].attrs["source"] = _source_of_deviation(results.ensemble_size)

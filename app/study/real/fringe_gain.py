@@ -39,7 +39,7 @@ def measure_gain(seed: int, inputs: Inputs, results: Results, truth: TruthContac
         Of the run, with fringes.
     truth : TruthContacts
     """
-    plain = infer_sequence(replace(inputs, tracks=replace(inputs.tracks, fringes=None)))
+    plain = infer_sequence(replace(inputs, tracks=replace(inputs.tracks, fringes=None)), diagnosis=())
     sides = [float("nan")] * len(results.frames)
     fringed, bare = (study_real(each, truth, sides).frames for each in (results, plain))
     static, overlap = (_mean([getattr(row, source).r for row in fringed]) for source in ("static", "overlap"))

@@ -138,7 +138,7 @@ def _measure_window(
     truth: DemTruth, photographs: range, noise: float, members: int, estimator: str, rng: np.random.Generator
 ) -> ErrorBars:
     inputs = calibrated_inputs(observe(truth, photographs, noise, rng, estimator=estimator))
-    nominal = list(infer_sequence(inputs).frames)
+    nominal = list(infer_sequence(inputs, diagnosis=()).frames)
     others = solve_members(inputs, members, workers=available_cores())
     errors, ensemble_sds, formula_sds = [], [], []
     for k, frame in enumerate(nominal[1:], start=1):

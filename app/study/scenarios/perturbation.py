@@ -177,7 +177,7 @@ def on_given_grains(key: Keys, force: Array, bodies: int, walls: int, given: int
 
 def _solve(inputs: Inputs, given: int) -> list[tuple[Keys, Array]]:
     """Return keys and forces of every frame on the given grains."""
-    results = infer_sequence(inputs)
+    results = infer_sequence(inputs, diagnosis=())
     bodies, walls = results.grains.count + inputs.walls.count, inputs.walls.count
 
     def forces(frame: FrameForces) -> tuple[Keys, Array]:

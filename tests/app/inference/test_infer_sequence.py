@@ -13,6 +13,7 @@ from rodsight.experiment.experiment import load_experiment
 from rodsight.inference import infer_sequence as inference
 from rodsight.inference import solve_frames as solving
 from rodsight.inference.correction import correct_sequence as correct_module
+from rodsight.inference.diagnosis.causes import finding
 from rodsight.inference.diagnosis.smoothed_tracks import EXPECTED_OF_SMOOTHED, SMOOTHED, TRUST_OF_SMOOTHED
 from rodsight.inference.frame_store import MemoryStore
 from rodsight.inference.infer_sequence import infer_sequence
@@ -22,6 +23,7 @@ from rodsight.results.results import Results
 from rodsight.robustness.design import Case
 from rodsight.robustness.factors import FIRST_COMPARED
 from rodsight.robustness.study import Nominal, measure_case
+from rodsight.solver.assessment.expected_correlation import contradict
 from rodsight.solver.assessment.penalties import TRUST_OF_FEW
 from rodsight.solver.bodies.wall_shapes import OUT
 from rodsight.solver.contacts.contacts import ContactSource
@@ -69,6 +71,24 @@ def test_the_friction_check_widens_the_intervals_of_every_frame(contradicted):
         assert after.trust == before.trust <= after.expected_correlation  # the frame's own evidence decides
         assert "the motion fits a friction of" in after.trust_penalties
         assert (after.fn_sd >= before.fn_sd).all()
+
+
+@pytest.mark.thorough
+def test_a_named_cause_that_a_run_does_not_correct_lowers_the_trust_of_every_frame(contradicted):
+    inputs, plain = contradicted
+    found = finding("friction", "rods slide as with a friction of 0.25")
+    results = infer_sequence(inputs, diagnosis=[found])
+    corrected = infer_sequence(inputs, diagnosis=[replace(found, corrected=True)])
+    assert plain.diagnosis == ()  # of fewer than a hundred rods
+    assert results.diagnosis == (found,)
+    assert corrected.diagnosis[0].corrected
+    for k, frame in enumerate(results.frames):
+        before = plain.frames[k]
+        assert frame.trust == contradict(before.trust) < before.trust
+        assert frame.expected_correlation == contradict(before.expected_correlation) < before.expected_correlation
+        assert frame.trust_penalties.startswith(f"friction: {found.cure}")
+        np.testing.assert_array_equal(frame.fn, before.fn)
+        assert corrected.frames[k].trust == before.trust
 
 
 @pytest.mark.slow

@@ -147,6 +147,16 @@ MUTANTS = [
         ("if not each.counted:", "if each.counted:"),
         ("1.0 if frame.soft else correlation_by_intervals(frame)", "correlation_by_intervals(frame)"),
         ("slope * expected - least", "slope * expected"),
+        (
+            "    if frame.status is FrameStatus.FAILED:\n        return frame\n"
+            "    return replace(\n        frame,\n        trust",
+            "    return replace(\n        frame,\n        trust",
+        ),
+        ("trust=contradict(frame.trust)", "trust=frame.trust"),
+        (
+            "expected_correlation=contradict(frame.expected_correlation)",
+            "expected_correlation=frame.expected_correlation",
+        ),
         ("= 2.5, 0.4  # of `most_by", "= 2.0, 0.4  # of `most_by"),
         ("(frame.trust_penalties, words)", "(words, frame.trust_penalties)"),
         ("check.measured, 1.0 / COVERAGE_FACTOR)", "check.measured, 1.0)"),

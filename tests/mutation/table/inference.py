@@ -10,9 +10,10 @@ MUTANTS = [
     *mutants_of(
         "app/inference/diagnosis/distortion.py",
         f"{TESTS}/diagnosis/test_diagnose.py",
-        ("if found is not None and found.applied else named", "if found is not None else named"),
-        ('return walls.count > 0 or material.stiffness in (None, "rigid")', "return walls.count > 0"),
-        ('return walls.count > 0 or material.stiffness in (None, "rigid")', "return True"),
+        ("if found is None or not found.applied:", "if found is None:"),
+        ("return walls.count > 0 or not _overlaps_are", "return walls.count > 0 and not _overlaps_are"),
+        ('return material.stiffness not in (None, "rigid")', "return False"),
+        ("corrected=not _overlaps_are_forces(inputs, walls, failed)", "corrected=True"),
     ),
     *mutants_of(
         "app/inference/correction/radii.py",
@@ -148,6 +149,8 @@ MUTANTS = [
         ("if len(snapshots) != 1:", "if snapshots:"),
         ("penalise_friction(frames[k], check, measured=measured)", "frames[k]"),
         ("return limit_for_smoothing(frame) if smoothed else frame", "return frame"),
+        ("in uncorrected(diagnosis))", "in diagnosis)"),
+        ("if words else assessed", "if False else assessed"),
         ("check.given, check.measured)", "check.measured, check.measured)"),
     ),
     *mutants_of(
@@ -203,6 +206,14 @@ MUTANTS = [
         ("rise[order[1]][0] > AHEAD", "rise[order[1]][0] > 0.0"),
         ("trial.expected[0] < UNEXPLAINED", "trial.expected[0] < 2.0"),
         ("bool(worst.words) and not worst.little_known", "bool(worst.words)"),
+        ("or not check.given_gap < QUIET", ""),
+    ),
+    *mutants_of(
+        "app/inference/diagnosis/causes.py",
+        f"{TESTS}/diagnosis/test_diagnose.py",
+        ("corrected=known.corrected and each.corrected", "corrected=known.corrected or each.corrected"),
+        ("and each.cause not in JUDGED_BY_FRAMES", ""),
+        ("if not each.corrected and", "if"),
     ),
     *mutants_of(
         "app/inference/correction/friction.py",
@@ -275,6 +286,7 @@ MUTANTS = [
         ("if not sequence.packing.scale_is_known:", "if False:"),
         ("drag / sequence.base_gravity", "drag"),
         ("max(1, (len(snapshots) - FRAMES) // 2)", "0"),
+        ('"photographs_reversed": 0.05', '"photographs_reversed": 0.1'),
     ),
     *mutants_of(
         "app/inference/diagnosis/trial.py",
@@ -300,7 +312,7 @@ MUTANTS = [
     *mutants_of(
         "app/prediction.py",
         PREDICTION,
-        ("each.cause not in CORRECTED for each", "True for each"),
+        ("not each.corrected for each", "True for each"),
         ("self.expected[0] >= GOOD and not self.diagnosis", "self.expected[0] >= GOOD"),
         ("(min(each, MOST_STATED) for each in (r, low, high))", "(r, low, high)"),
         ("if self.trial.stride > 1:", "if False:"),

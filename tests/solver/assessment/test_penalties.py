@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rodsight.solver.assessment.expected_correlation import contradict
 from rodsight.solver.assessment.intervals.force_intervals import FRICTION_ERROR
 from rodsight.solver.assessment.motion_information import MotionInformation
 from rodsight.solver.assessment.penalties import (
@@ -17,6 +18,7 @@ from rodsight.solver.assessment.penalties import (
     limit_by_intervals,
     limit_for_few_photographs,
     most_by_intervals,
+    penalise_contradiction,
     penalise_friction,
 )
 from rodsight.solver.assessment.trust import motion_assessment
@@ -151,6 +153,18 @@ def test_positions_do_not_depend_on_a_friction_that_the_motion_contradicts():
         odds.append(np.log(penalised.sliding_probability[0] / (1.0 - penalised.sliding_probability[0]) / (0.4 / 0.6)))
     assert odds == pytest.approx([odds[0], 0.5 * odds[0], 0.0], abs=1e-9)
     assert odds[0] < -0.1
+
+
+def test_a_frame_of_contradictory_input_is_trusted_less_for_a_reason_that_comes_first():
+    frame = replace(
+        make_results(1, 8, 7, sweeps=2).frames[0], trust=0.9, expected_correlation=0.97, trust_penalties="noise"
+    )
+    penalised = penalise_contradiction(frame, "photographs reversed")
+    assert penalised.trust == contradict(0.9) < 0.9
+    assert penalised.expected_correlation == contradict(0.97) < 0.97
+    assert penalised.trust_penalties == "photographs reversed; noise"
+    failed = failed_frame(3, "no contacts", 4, 2)
+    assert penalise_contradiction(failed, "photographs reversed") is failed
 
 
 def test_two_photographs_alone_are_not_trusted():

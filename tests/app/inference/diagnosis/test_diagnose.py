@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rodsight.inference.diagnosis import diagnose as module
 from rodsight.inference.diagnosis import distortion
-from rodsight.inference.diagnosis.causes import CAUSES, finding, name_once
+from rodsight.inference.diagnosis.causes import CAUSES, finding, name_once, uncorrected
 from rodsight.inference.diagnosis.diagnose import diagnose
 from rodsight.inference.diagnosis.rivals import rivals_of
 from rodsight.inference.diagnosis.trial import Trial
@@ -101,6 +101,17 @@ def test_a_stretching_is_sought_in_gaps_without_walls_too():
     assert found.cause == "stretched_picture"
 
 
+@pytest.mark.parametrize(("stiffness", "corrected"), [(None, True), ("rigid", True), (1e5, False)])
+def test_of_the_stretching_of_soft_grains_a_run_removes_a_part_only(monkeypatch, stiffness, corrected):
+    found = SimpleNamespace(
+        applied=True, value=np.ones(8), radial_change=lambda: False, describe=lambda: ("a stretching was removed",)
+    )
+    monkeypatch.setattr(distortion, "correct_camera", lambda _, tracks, walls, *__, **___: (tracks, walls, "", found))
+    inputs = replace(INPUTS, material=replace(INPUTS.material, stiffness=stiffness))
+    (named,) = distortion.undistorted(inputs, inputs.walls, ())[2]
+    assert named == finding("stretched_picture", "a stretching was removed", corrected=corrected)
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("rises", [
     {"all_radii": 0.5, "stretched_picture": 0.45},
@@ -186,6 +197,29 @@ def test_the_documentation_lists_every_cause():
 def test_a_cause_that_two_tests_find_is_named_once_with_the_evidence_of_both():
     found = name_once([finding("lens", "a"), finding("friction", "b"), finding("lens", "c")])
     assert [(each.cause, each.evidence) for each in found] == [("lens", "a; c"), ("friction", "b")]
+    assert [each.corrected for each in found] == [True, False]
+    (left,) = name_once([finding("lens", "a"), finding("lens", "c", corrected=False)])
+    assert not left.corrected
+
+
+def test_forces_suffer_from_causes_that_neither_a_run_corrects_nor_single_frames_show():
+    found = [finding(each, "") for each in ("lens", "friction", "not_explained", "smoothed_tracks", "rotation_sign")]
+    assert [each.cause for each in uncorrected(found)] == ["friction", "rotation_sign"]
+    assert uncorrected([finding("friction", "", corrected=True), finding("lens", "", corrected=False)]) == [
+        finding("lens", "", corrected=False)
+    ]
+
+
+def test_sliding_that_only_an_impossible_friction_explains_is_examined(monkeypatch):
+    """Photographs in reverse order look like a friction beyond all trials, at which nothing is left of the gap."""
+    examined: list[bool] = []
+    monkeypatch.setattr(module, "diagnose", lambda *_, sliding, **__: examined.append(sliding) or [])
+    for gap in ([0.05, 0.06, 0.07], [0.9, 0.8, 0.07]):
+        check = SimpleNamespace(agrees=True, given_gap=float(np.interp(1.0, [0.8, 1.0, 5.0], gap)))
+        frames = [SimpleNamespace(expected_correlation=0.97)] * 8
+        results = SimpleNamespace(friction_check=check, frames=frames, wall_force_ratio=lambda: np.empty(0))
+        module.diagnose_solved(None, results)  # type: ignore[arg-type]
+    assert examined == [False, True]
 
 
 @pytest.mark.parametrize(("expected", "compared"), [
