@@ -17,6 +17,7 @@ from .inference.diagnosis.smoothed_tracks import EXPECTED_OF_SMOOTHED, LOW_OF_SM
 from .inference.diagnosis.trial import PREDICTED_PHOTOGRAPHS, Trial, solve_trial
 from .inference.inference_settings import material_of, settings_of
 from .inference.inputs import Inputs
+from .inference.softness_trial import with_softness
 from .inference.solve_frames import InferenceObserver
 from .process.errors import UndeterminedError
 from .process.machine.linear_algebra import one_thread_each
@@ -145,6 +146,7 @@ def predict_accuracy(
         return Prediction(quality, None, NOT_PREDICTED_OF_ONE)
     inputs = Inputs(tracks, walls, material_of(config), settings_of(config))
     try:
+        inputs = with_softness(inputs)
         trial = solve_trial(inputs, PREDICTED_PHOTOGRAPHS, InferenceObserver(progress))
         doubtful = trial is not None and trial.expected[0] < DOUBTFUL
         doubted = solve_trial(inputs, observer=InferenceObserver(progress)) if doubtful else None

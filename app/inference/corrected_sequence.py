@@ -40,6 +40,7 @@ class CorrectedSequence:
     noise_remark: str = ""  # where the measured noise contradicts the stated one
     lens: CameraDistortion | None = None  # None: not sought
     jumping: bool = False  # whether poses that jump were taken out
+    softness_hidden: bool = False  # whether errors may hide that grains, taken for hard, are soft
 
     @property
     def undisturbed(self) -> bool:

@@ -42,6 +42,7 @@ from .diagnosis.smoothed_tracks import find_smoothing, limit_for_smoothing
 from .first_frame import estimate_first_frame
 from .frame_store import FrameStore, MemoryStore
 from .inputs import Inputs
+from .softness_trial import correct_by_trial
 from .solve_frames import InferenceObserver, solve_frames, summarise_frame, with_remarks
 
 FIRST_FRAME = "first photograph"  # stage in which the first frame is estimated from all others
@@ -67,8 +68,8 @@ def infer_sequence(
     store : FrameStore, optional
         Keeps solved frames; frames that it holds already are not solved again. Default: in memory.
     complete : bool
-        Whether all photographs are there. Without it the estimate of the first frame from all others, the friction
-        check and the diagnosis are left out.
+        Whether all photographs are there. Without it the trial of softness, the estimate of the first frame from all
+        others, the friction check and the diagnosis are left out.
     diagnosis : sequence of Finding, optional
         Causes of wrong forces that are known; None: they are sought.
 
@@ -84,7 +85,7 @@ def infer_sequence(
     """
     observer = InferenceObserver() if observer is None else observer
     store = MemoryStore() if store is None else store
-    sequence = correct_sequence(inputs)
+    inputs, sequence = correct_by_trial(inputs) if complete else (inputs, correct_sequence(inputs))
     release_free_memory()  # of equations of all photographs
     observer.corrected(sequence)
     solve_frames(sequence, store, observer)

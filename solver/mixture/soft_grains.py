@@ -30,24 +30,31 @@ FEWEST_PAIRS = 20  # more than grains, which such errors could explain by chance
 
 
 def find_soft_overlap(packing: Packing, snapshots: Sequence[Snapshot]) -> float:
-    """Find the mean overlap of touching pairs [m] of soft grains; 0 if grains are hard.
+    """Find the mean overlap of touching pairs [m] of soft grains; 0 if grains are hard, or errors hide it."""
+    return judge_gaps(packing, snapshots)[0]
+
+
+def judge_gaps(packing: Packing, snapshots: Sequence[Snapshot]) -> tuple[float, bool]:
+    """Return the overlap of `find_soft_overlap`, and whether errors may hide that of soft grains.
 
     Notes
     -----
     With o and s the mean overlap and standard deviation of touching gaps, σ the noise of a position, o' the overlap by
-    `measure_precision`: soft if o' ≥ 2.5 σ, 0.5 s < o < 2.5 s, s > 1.2 √2 σ, and `fraction_of_pairs` is not small.
+    `measure_precision`: soft if o' ≥ 2.5 σ, 0.5 s < o < 2.5 s, s > 1.2 √2 σ, and `fraction_of_pairs` is not small. A
+    wrong scale shifts o and leaves the other measures: the gaps are then those of soft grains, or of hard ones with
+    errors of centres or radii.
     """
     found = measure_precision(packing.grains, snapshots)
     if found is None or found.overlap < MIN_OVERLAP * found.sigma:
-        return 0.0
+        return 0.0, False
     try:
         evidence = gather_position_evidence(packing, snapshots)
     except ValueError:  # no two bodies are near
-        return 0.0
+        return 0.0, False
     overlap, sd = -evidence.touching.offset, evidence.touching.sd
-    noise = 2.0**0.5 * found.sigma
-    soft = OVERLAP_RATIO[0] * sd < overlap < OVERLAP_RATIO[1] * sd and sd > MIN_SD * noise
-    return overlap if soft and fraction_of_pairs(evidence) >= LEAST_OF_PAIRS else 0.0
+    scattered = sd > MIN_SD * 2.0**0.5 * found.sigma and fraction_of_pairs(evidence) >= LEAST_OF_PAIRS
+    soft = scattered and OVERLAP_RATIO[0] * sd < overlap < OVERLAP_RATIO[1] * sd
+    return (overlap, False) if soft else (0.0, scattered)
 
 
 def fraction_of_pairs(evidence: SequenceEvidence) -> float:

@@ -61,7 +61,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     nothing_seen = len(failed) == tracks.frame_count
     if nothing_seen:
         settings = replace(settings, boundary=None, calibration=None, coordination=None)
-    overlap, as_given = settings.overlap_of(tracks.radius), settings.calibration is None
+    overlap, as_given, hidden = settings.overlap_of(tracks.radius), settings.calibration is None, False
     calibration = tuning = boundary = lens = None
     remarks, material = [outlier_remark, gap_remark, "", "", "", "", "", "", size_remark, id_remark], inputs.material
     if settings.calibration is not None:
@@ -77,7 +77,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
             tracks, remarks[3] = measure_noise(tracks, walls)
         tracks, walls, boundary = correct_walls(settings.boundary, tracks, walls)
     if settings.calibration is not None:
-        sequence = find_softness(material, settings.sequence, tracks, walls, failed)
+        sequence, hidden = find_softness(material, settings.sequence, tracks, walls, failed)
         # Overlaps of soft grains are forces: calibration would remove them as errors.
         settings = replace(settings, sequence=sequence, calibration=None if sequence.soft else settings.calibration)
     if settings.calibration is not None:
@@ -132,7 +132,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         packing, tracks, walls, seen,
         settings.for_overlap(overlap), inputs.verdicts, calibration, tuning, boundary, failed, of_walls,
         inputs.material.friction_measured, inputs.material.base_gravity, "; ".join(each for each in remarks if each),
-        lens, bool(outlier_remark),
+        lens, bool(outlier_remark), hidden,
     )  # fmt: skip
     return corrected if as_given or nothing_seen or tuning is not None else correct_soft_grains(corrected)
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ...solver.bodies.packing import Packing
 from ...solver.bodies.rods import RodMaterial
-from ...solver.mixture.soft_grains import find_soft_overlap
+from ...solver.mixture.soft_grains import judge_gaps
 from ...solver.nlgs.chain import force_scale
 from ...solver.part_settings import MAX_TRUST_MEASURED, MAX_TRUST_STATED
 from ...solver.posterior.posterior_settings import PosteriorSettings
@@ -59,18 +59,21 @@ def assume_softness(
 
 def find_softness(
     material: RodMaterial, settings: SequenceSettings, tracks: Tracks, walls: WallTracks, failed: Collection[int]
-) -> SequenceSettings:
-    """Adapt the settings to soft grains, as specified or as their gaps show; unchanged for hard grains."""
+) -> tuple[SequenceSettings, bool]:
+    """Adapt the settings to soft grains, as specified or as their gaps show; unchanged for hard grains.
+
+    Also return whether errors may hide that grains are soft.
+    """
     if settings.positions == "never" or material.stiffness == "rigid":
-        return settings
+        return settings, False
     packing, snapshots = pack_seen(material, tracks, walls, failed)
-    seen = find_soft_overlap(packing, snapshots)
+    seen, hidden = judge_gaps(packing, snapshots)
     # A given stiffness, or the request to estimate it, means soft grains even where too small radii hide the overlaps.
     if material.stiffness is None and (not seen or find_wrong_sizes(tracks, walls, failed)):
-        return settings
+        return settings, hidden and not find_wrong_sizes(tracks, walls, failed)
     trust = MAX_TRUST_MEASURED if seen else MAX_TRUST_STATED
     posterior = _stiffness_prior(material, settings, packing)
-    return replace(settings, soft=True, measured_overlap=seen, soft_trust=trust, posterior=posterior)
+    return replace(settings, soft=True, measured_overlap=seen, soft_trust=trust, posterior=posterior), False
 
 
 def _stiffness_prior(material: RodMaterial, settings: SequenceSettings, packing: Packing) -> PosteriorSettings:

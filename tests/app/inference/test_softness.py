@@ -28,7 +28,7 @@ def test_hard_rods_are_soft_only_where_their_stiffness_is_specified(made_tracks:
     assert walls is not None
     material = replace(material_of(experiment.config), stiffness=stiffness)
     settings = settings_of(experiment.config).sequence
-    found = find_softness(material, settings, tracks, walls, ())
+    found, _ = find_softness(material, settings, tracks, walls, ())
     assert found.soft is soft
     assert found.soft_trust == (MAX_TRUST_STATED if soft else MAX_TRUST_MEASURED)
     if stiffness == 1e6:
@@ -40,13 +40,13 @@ def test_hard_rods_are_soft_only_where_their_stiffness_is_specified(made_tracks:
 
 
 def test_overlaps_that_the_gaps_show_are_trusted_more(made_tracks: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(softness, "find_soft_overlap", lambda *_: 3e-5)
+    monkeypatch.setattr(softness, "judge_gaps", lambda *_: (3e-5, False))
     experiment = load_experiment(made_tracks)
     tracks = read_tracks(experiment)
     walls = read_walls(experiment, tracks.frame_count)
     assert walls is not None
     material = replace(material_of(experiment.config), stiffness=None)
-    found = find_softness(material, settings_of(experiment.config).sequence, tracks, walls, ())
+    found, _ = find_softness(material, settings_of(experiment.config).sequence, tracks, walls, ())
     assert found.soft
     assert found.measured_overlap == 3e-5
     assert found.soft_trust == MAX_TRUST_MEASURED

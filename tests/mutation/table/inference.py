@@ -235,6 +235,15 @@ MUTANTS = [
         ("MAX_TRUST_MEASURED if seen else MAX_TRUST_STATED", "MAX_TRUST_MEASURED"),
         ("/ (2.0 * float(packing.grains.radius.mean()))", "/ float(packing.grains.radius.mean())"),
         ("compliance_sd=STIFFNESS_SD * overlap", "compliance_sd=STIFFNESS_SD"),
+        ("hidden and not find_wrong_sizes(tracks, walls, failed)", "hidden"),
+    ),
+    *mutants_of(
+        "app/inference/softness_trial.py",
+        f"{TESTS}/test_softness_trial.py",
+        ("if not sequence.softness_hidden:", "if False:"),
+        ("not trial.expected[0] < FITS", "False"),
+        ("if not rise > SHOWN:", "if not rise > 0.0:"),
+        ("changed = correct_sequence(soft)", "changed = sequence"),
     ),
     *mutants_of(
         "app/inference/correction/soft_grain_errors.py",
