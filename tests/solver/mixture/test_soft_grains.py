@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 from rodsight.solver.bodies.grains import Grains
 from rodsight.solver.contacts.pairs import split_keys
-from rodsight.solver.mixture.soft_grains import FEWEST_PAIRS, LEAST_OF_PAIRS, find_soft_overlap, fraction_of_pairs
+from rodsight.solver.mixture.soft_grains import (
+    FEWEST_PAIRS,
+    LEAST_OF_PAIRS,
+    find_soft_overlap,
+    fraction_of_pairs,
+    judge_gaps,
+)
 from rodsight.solver.posterior.sequence_evidence import gather_position_evidence
 
 from tests.solver.posterior.simulated import NOISE, SimulatedShear, simulate_shear
@@ -31,6 +37,15 @@ def soft() -> SimulatedShear:
 def test_soft_grains_are_found_and_hard_ones_are_not(hard, soft) -> None:
     assert find_soft_overlap(hard.packing, hard.snapshots) == 0.0
     assert find_soft_overlap(soft.packing, soft.snapshots) > 1e-4
+
+
+@pytest.mark.thorough
+def test_a_wrong_scale_hides_overlaps_among_gaps_that_scatter(hard, soft) -> None:
+    overlap, hidden = judge_gaps(soft.packing, soft.snapshots)
+    assert not hidden
+    smaller = Grains.of_rods(soft.packing.grains.radius - 0.5 * overlap, density=2700.0, length=0.06)
+    assert judge_gaps(replace(soft.packing, grains=smaller), soft.snapshots) == (0.0, True)
+    assert judge_gaps(hard.packing, hard.snapshots) == (0.0, False)
 
 
 @pytest.mark.parametrize("error", ["radii", "all radii alike", "a fifth too large"])
