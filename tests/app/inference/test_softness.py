@@ -52,6 +52,22 @@ def test_overlaps_that_the_gaps_show_are_trusted_more(made_tracks: Path, monkeyp
     assert found.soft_trust == MAX_TRUST_MEASURED
 
 
+@pytest.mark.parametrize(("sizes", "hidden"), [({}, True), ({0.008: 0.02}, False)])
+def test_errors_may_hide_overlaps_unless_wrong_sizes_explain_the_gaps(
+    made_tracks: Path, monkeypatch: pytest.MonkeyPatch, sizes: dict[float, float], hidden: bool
+) -> None:
+    monkeypatch.setattr(softness, "judge_gaps", lambda *_: (0.0, True))
+    monkeypatch.setattr(softness, "find_wrong_sizes", lambda *_: sizes)
+    experiment = load_experiment(made_tracks)
+    tracks = read_tracks(experiment)
+    walls = read_walls(experiment, tracks.frame_count)
+    assert walls is not None
+    settings = settings_of(experiment.config).sequence
+    unknown = replace(material_of(experiment.config), stiffness=None)
+    assert find_softness(unknown, settings, tracks, walls, ()) == (settings, hidden)
+    assert find_softness(replace(unknown, stiffness="rigid"), settings, tracks, walls, ()) == (settings, False)
+
+
 def lattice_tracks(noise: float) -> tuple[Tracks, WallTracks]:
     """Tracks of equal rods in a lattice with noise [m], and no walls."""
     packing, snapshots = lattice_sequence(noise)
