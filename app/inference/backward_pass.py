@@ -75,7 +75,7 @@ def fuse_second_frame(sequence: CorrectedSequence, first: FramePosterior, second
     weight = _second_weight(own, INDEPENDENT * alike, sd**2 + drift)
     fused = (1.0 - weight) * np.column_stack([first.fn, first.ft]) + weight * force
     # Positions determine the pattern better than the size of stresses along free walls, which sliding determines.
-    size = (_load_ratio(sequence) / scale) ** alike
+    size = (sequence.packing.load_ratio(*sequence.snapshots[:2]) / scale) ** alike
     fused_sd = size * np.sqrt((1.0 - weight) * own)
     return replace(
         first, fn=size * fused[:, 0], ft=size * fused[:, 1], fn_sd=fused_sd[:, 0], ft_sd=fused_sd[:, 1],
@@ -86,9 +86,3 @@ def fuse_second_frame(sequence: CorrectedSequence, first: FramePosterior, second
 def _second_weight(variance: Array, information: float, second: Array) -> Array:
     """Weight of the second estimate (c, 1), equal for both components: the mean stays in the Coulomb cone."""
     return information * variance[:, :1] / (information * variance[:, :1] + second[:, :1])
-
-
-def _load_ratio(sequence: CorrectedSequence) -> float:
-    """Loads of the first frame over those of the second."""
-    first, second = (sequence.packing.mean_pressure(each) for each in sequence.snapshots[:2])
-    return first / second if min(first, second) > 0.0 else 1.0

@@ -100,6 +100,21 @@ class Packing:
         walls = self.walls(snapshot.endpoints, snapshot.side, snapshot.load)
         return float((walls.load[plates] / (walls.face[plates] * self.length)).mean())
 
+    def load_ratio(self, snapshot: Snapshot, other: Snapshot) -> float:
+        """Compute the mean stress by loads and weight at a snapshot over that at another one; 1 without plates.
+
+        Notes
+        -----
+        Plates bear their load, and grains between them on average half of the weight on the faces of the plates, so
+        that a light load changes the stress of a heavy packing little.
+        """
+        one, two = self.mean_pressure(snapshot), self.mean_pressure(other)
+        if not min(one, two) > 0.0:
+            return 1.0
+        face = self.walls(snapshot.endpoints, snapshot.side, snapshot.load).face[np.isfinite(self.pressure)]
+        weight = float(np.linalg.norm(self.weight.sum(axis=0))) / (2.0 * float(face.mean()) * self.length)
+        return (one + weight) / (two + weight)
+
     def load(
         self,
         endpoints: Array,

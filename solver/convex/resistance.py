@@ -24,6 +24,7 @@ REVERSED = 0.5  # gap of the reversed motion over that of the given one, below w
 AHEAD = 0.85  # gap of the winner over that of the second
 FRAMES = 4  # consecutive photographs on which models are compared
 FEWEST = 2  # of these
+AS_GIVEN = 0.2  # relative difference of the friction of walls up to which it is the given one
 LEAST_WALLS = 12  # contacts with walls from which on their friction is a rival
 MOST_FRICTION = 3.0  # times the given friction: with more, forces on a few contacts explain any sliding
 # Gap with a rolling resistance over that of the given model and of another friction, below which it is named. On
@@ -91,7 +92,10 @@ def find_resistance(frames: Sequence[ResistedFrame], given: SlidingModel, worker
     if best and is_clearly_less(sound[best].gap, min(before, friction)):
         others = [each.gap for name, each in sound.items() if name not in (best, "friction")]
         if all(sound[best].gap < AHEAD * other for other in others):
-            return Resistance(best, given, before, sound[best].model, sound[best].gap)
+            # Another friction between grains beside walls as they are given: these are not to blame.
+            walls_fit = abs(sound[best].model.wall_friction - given.wall_friction) < AS_GIVEN * given.wall_friction
+            cause = "friction" if best == "wall_friction" and walls_fit else best
+            return Resistance(cause, given, before, sound[best].model, sound[best].gap)
         return nothing  # it is one of two, and friction alone is worse than either
     (rolling,) = compare_models(frames, given, [("rolling",)], workers)
     least = min(MOST_GAP, before - LEAST_GAP, ROLLING * before, ROLLING * friction)

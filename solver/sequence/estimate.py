@@ -270,8 +270,7 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
     pressure = mean_stress(problem, estimate)
     load = packing.mean_pressure(snapshot)
     # A return from a faulty frame is no jump, nor is a change of the measured loads.
-    before = packing.mean_pressure(problem.sequence.snapshots[max(problem.k - 1, 0)])
-    load_ratio = load / before if before > 0 and load > 0 else 1.0
+    load_ratio = packing.load_ratio(snapshot, problem.sequence.snapshots[max(problem.k - 1, 0)])
     former = [load_ratio * p for p in (state.pressure, state.sound_pressure) if p > 0]
     jump = min((abs(pressure - p) / p for p in former), default=np.nan)
     return Evidence(

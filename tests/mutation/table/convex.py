@@ -138,6 +138,7 @@ MUTANTS = [
         ("if turned < min(REVERSED * before, before - LEAST_GAP, MOST_GAP):", "if turned < MOST_GAP:"),
         ("before - LEAST_GAP, MOST_GAP):", "MOST_GAP):"),
         ('if name != "wall_friction" or walls >= LEAST_WALLS', "if True"),
+        ('if best == "wall_friction" and walls_fit else best', "if False else best"),
         ("> MOST_FRICTION * given.friction:", "> 1e9 * given.friction:"),
         ("min(before, friction))", "before)"),
         ('if name not in (best, "friction")', "if name not in (best, *sound)"),

@@ -115,8 +115,7 @@ MUTANTS = [
         "app/inference/backward_pass.py",
         f"{TESTS}/test_backward_pass.py",
         ("information * variance[:, :1] + second[:, :1]", "variance[:, :1] + second[:, :1]"),
-        ("(_load_ratio(sequence) / scale) ** alike", "(_load_ratio(sequence) * scale) ** alike"),
-        ("return first / second if", "return second / first if"),
+        ("snapshots[:2]) / scale) ** alike", "snapshots[:2]) * scale) ** alike"),
         ("np.sqrt((1.0 - weight) * own)", "np.sqrt((1.0 + weight) * own)"),
         ("* alike, sd**2 + drift)", "* alike, sd**2)"),
         (

@@ -43,3 +43,13 @@ def test_weight_is_enough_unless_boundary_grains_carry_it(bare: Packing) -> None
     heavy = replace(bare, material=replace(bare.material, gravity=(0.0, -9.81)))
     assert heavy.is_loaded
     assert not with_boundary(heavy).is_loaded
+
+
+def test_a_light_load_changes_the_stress_of_a_heavy_packing_little() -> None:
+    packing, snapshots = lattice_sequence(0.0)  # the third wall is loaded, the ratio of forces that of its loads
+    one, two = (replace(snapshots[0], load=np.array([np.nan, np.nan, load, np.nan])) for load in (30.0, 10.0))
+    assert packing.load_ratio(one, two) == pytest.approx(3.0)
+    heavy = replace(packing, material=replace(packing.material, gravity=(0.0, -9.81)))
+    weight = 0.5 * float(packing.grains.mass.sum()) * 9.81
+    assert heavy.load_ratio(one, two) == pytest.approx((30.0 + weight) / (10.0 + weight))
+    assert replace(packing, pressure=np.full(4, np.nan)).load_ratio(one, two) == 1.0

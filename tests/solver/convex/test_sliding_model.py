@@ -202,15 +202,33 @@ def test_only_a_clear_winner_is_named(frames, monkeypatch, gaps, cause):
         resistance,
         "compare_models",
         lambda frames, given, rivals, workers: [
-            FittedModel(given, gap, True)
+            FittedModel(replace(given, wall_friction=0.25), gap, True)
             for name, gap in fitted.items()
             if resistance.RIVALS.get(name, (name,)) in rivals
         ],
     )
     monkeypatch.setattr(resistance, "LEAST_WALLS", 0)
-    found = find_resistance(frames[2], GIVEN)
+    found = find_resistance(frames[2], replace(GIVEN, wall_friction=0.5))
     assert found is not None
     assert found.cause == cause
+
+
+def test_walls_with_the_friction_that_is_given_are_not_blamed(frames, monkeypatch):
+    """The rods' friction is wrong then; fitted for both alike it would shift that of the walls."""
+    fitted = GAPS | {"wall_friction": 0.1}
+    other = replace(GIVEN, friction=0.5 * GIVEN.friction, wall_friction=1.1 * GIVEN.wall_friction)
+    monkeypatch.setattr(resistance, "power_gap", lambda *_: 0.45)
+    monkeypatch.setattr(resistance, "LEAST_WALLS", 0)
+    monkeypatch.setattr(
+        resistance,
+        "compare_models",
+        lambda frames, given, rivals, workers: [
+            FittedModel(other, fitted[name], True) for name in fitted if resistance.RIVALS.get(name) in rivals
+        ],
+    )
+    found = find_resistance(frames[2], GIVEN)
+    assert found is not None
+    assert (found.cause, found.found, found.found_gap) == ("friction", other, 0.1)
 
 
 @pytest.mark.parametrize(
