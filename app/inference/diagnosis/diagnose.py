@@ -103,7 +103,7 @@ def diagnose(
     impossible = np.zeros(tracks.status.shape, np.bool_) if undisturbed else find_impossible_poses(tracks, walls)
     poses = examine_poses(tracks, impossible)
     if not found and sliding and inputs.tracks.grain_count >= LEAST_GRAINS:
-        found = _examine_sliding(inputs, first)
+        found = _examine_sliding(inputs, first) or (_examine_sliding(inputs, 0) if first else [])
     if not (found or trial is None or inputs.tracks.grain_count < LEAST_GRAINS):
         # Gaps between hard rods show a stretching by themselves. Where they show none, one that wins moves the walls.
         shown = undisturbed or sought

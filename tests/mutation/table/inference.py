@@ -206,6 +206,7 @@ MUTANTS = [
         ("trial.expected[0] < UNEXPLAINED", "trial.expected[0] < 2.0"),
         ("bool(worst.words) and not worst.little_known", "bool(worst.words)"),
         ("or not check.given_gap < QUIET", ""),
+        (" or (_examine_sliding(inputs, 0) if first else [])", ""),
     ),
     *mutants_of(
         "app/inference/diagnosis/causes.py",

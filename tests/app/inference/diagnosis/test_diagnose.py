@@ -239,6 +239,21 @@ def test_rivals_are_compared_where_photographs_after_the_first_are_doubtful(
     assert begun == ([] if compared is None else [compared])
 
 
+def test_what_resists_the_sliding_is_sought_in_the_first_photographs_too(monkeypatch):
+    sought = []
+
+    def examine(inputs, first):
+        sought.append(first)
+        return [finding("friction", "")] if first == 0 else []
+
+    monkeypatch.setattr(module, "_examine_sliding", examine)
+    (found,) = diagnose(INPUTS, None, first=4)
+    assert found.cause == "friction"
+    assert sought == [4, 0]
+    diagnose(INPUTS, None)
+    assert sought == [4, 0, 0]
+
+
 @pytest.mark.parametrize("undisturbed", [False, True])
 def test_what_a_run_has_sought_in_vain_is_not_sought_again(monkeypatch, undisturbed):
     sought = []
