@@ -22,4 +22,4 @@ class Finding:
 
     def as_plain(self) -> dict[str, str]:
         """Return the values of summary.json."""
-        return {name: value for name, value in asdict(self).items() if isinstance(value, str)}
+        return {name: value for name, value in asdict(self).items() if name != "corrected"}

@@ -69,8 +69,10 @@ def find_softness(
     packing, snapshots = pack_seen(material, tracks, walls, failed)
     seen, hidden = judge_gaps(packing, snapshots)
     # A given stiffness, or the request to estimate it, means soft grains even where too small radii hide the overlaps.
-    if material.stiffness is None and (not seen or find_wrong_sizes(tracks, walls, failed)):
-        return settings, hidden and not find_wrong_sizes(tracks, walls, failed)
+    if material.stiffness is None:
+        wrong_sizes = bool((seen or hidden) and find_wrong_sizes(tracks, walls, failed))
+        if not seen or wrong_sizes:
+            return settings, hidden and not wrong_sizes
     trust = MAX_TRUST_MEASURED if seen else MAX_TRUST_STATED
     posterior = _stiffness_prior(material, settings, packing)
     return replace(settings, soft=True, measured_overlap=seen, soft_trust=trust, posterior=posterior), False

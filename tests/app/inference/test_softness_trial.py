@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import pytest
@@ -33,11 +33,10 @@ def corrected(monkeypatch):
     return stiffness
 
 
-class Sequence(SimpleNamespace):
-    noise_remark = "noise is larger than stated"
-
-    def __replace__(self, **changes):
-        return Sequence(**vars(self) | changes)
+@dataclass(frozen=True)
+class Sequence:
+    softness_hidden: bool
+    noise_remark: str = "noise is larger than stated"
 
 
 def solved(monkeypatch, expected: float, rise: float) -> list[tuple[object, bool]]:
@@ -50,9 +49,6 @@ def solved(monkeypatch, expected: float, rise: float) -> list[tuple[object, bool
 
     monkeypatch.setattr(module, "solve_trial", trial)
     monkeypatch.setattr(module, "trial_score", lambda inputs: trial(inputs).score + rise)
-    monkeypatch.setattr(module, "replace", lambda each, **changes: (
-        each.__replace__(**changes) if isinstance(each, Sequence) else replace(each, **changes)
-    ))  # fmt: skip
     return tried
 
 

@@ -235,7 +235,7 @@ MUTANTS = [
         ("MAX_TRUST_MEASURED if seen else MAX_TRUST_STATED", "MAX_TRUST_MEASURED"),
         ("/ (2.0 * float(packing.grains.radius.mean()))", "/ float(packing.grains.radius.mean())"),
         ("compliance_sd=STIFFNESS_SD * overlap", "compliance_sd=STIFFNESS_SD"),
-        ("hidden and not find_wrong_sizes(tracks, walls, failed)", "hidden"),
+        ("hidden and not wrong_sizes", "hidden"),
     ),
     *mutants_of(
         "app/inference/softness_trial.py",
