@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,15 @@ from scipy.spatial import ConvexHull, KDTree
 from ..process.counts import state_count
 from ..process.errors import InputError
 from ..solver.bodies.grains import Array
-from ..solver.bodies.wall_shapes import IN, OUT, STRAIGHT, beside_wall, bounding_distance, wall_distance
+from ..solver.bodies.wall_shapes import (
+    IN,
+    OUT,
+    STRAIGHT,
+    beside_wall,
+    bounding_distance,
+    outward_normals,
+    wall_distance,
+)
 from ..solver.boundary.continuation import bearing_past_ends
 from ..solver.calibration.gaps import MeasuredSequence
 from ..tracks import Tracks, WallTracks
@@ -27,7 +35,8 @@ GREATEST_FRACTION = 2.0  # of the packing's diagonal: no radius is larger
 MISTAKE_TOLERANCE = 0.15  # relative difference between a spacing and that of a known mistake, at most
 HEAVIEST_IN_G_PER_CM3 = 1e-3 * SOLID_DENSITIES[1]
 STRENGTH = 1e8  # [Pa] mean stress: contacts of rods then carry several times that, and metals yield
-OPEN = 1e-6  # [rad] two parallel walls face each other within this
+OPEN = 1e-5  # [rad] two parallel walls face each other within this
+FACING_DECIMALS = 6  # of the angles of walls [rad] that face the same way
 SIDE_OF_PACKING = {
     STRAIGHT: "to the left of the line from (x1, y1) to (x2, y2)",
     IN: "inside the circle (its side is in)",
@@ -68,12 +77,12 @@ def check_packing(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> 
     sources = PackingSources.of(experiment)
     check_inside(sources, tracks, walls)
     check_radii(sources, tracks)
-    sides = open_sides(walls) if walls.cell is None and tracks.boundary is None else []
+    bounded_by_walls = walls.cell is None and tracks.boundary is None
     return [
         *rods_beyond_ends(tracks, walls),
         *implausible_density(experiment.config.material.density),
         *implausible_loads(experiment, tracks, walls),
-        *sides,
+        *(open_sides(walls, experiment.config.material.gravity) if bounded_by_walls else []),
         *free_surfaces(experiment, tracks, walls),
     ]
 
@@ -202,21 +211,31 @@ def rim_points(position: Array, radius: Array, count: int) -> Array:
     return (position[:, None] + rim).reshape(-1, 2)
 
 
-def open_sides(walls: WallTracks) -> list[str]:
-    """Return a warning where the walls of frame 0, taken as infinite lines, leave a direction open."""
+def open_sides(walls: WallTracks, gravity: Sequence[float]) -> list[str]:
+    """Return a warning where the walls of frame 0, taken as infinite lines, leave a direction open.
+
+    Weight holds the rods as a wall above them would. Of walls that face the same way the outermost is named.
+    """
     if walls.count == 0 or (walls.sides == IN).any():
         return []
     straight = np.flatnonzero(walls.sides == STRAIGHT)
     if not len(straight):
         return ["The boundary is open: no wall surrounds the rods."]
-    along = walls.endpoints[0, straight, 1] - walls.endpoints[0, straight, 0]
-    inward = np.arctan2(along[:, 0], -along[:, 1])
-    order = np.argsort(inward)
-    angle = np.diff(np.concatenate([inward[order], inward[order[:1]] + 2.0 * np.pi]))
+    ends = walls.endpoints[0, straight]
+    inward = -outward_normals(ends)
+    inmost_first = np.argsort(-(inward * ends.mean(axis=1)).sum(axis=1))
+    by_angle = {
+        round(float(np.arctan2(inward[w, 1], inward[w, 0])), FACING_DECIMALS): walls.name[straight[w]]
+        for w in inmost_first
+    }
+    if any(gravity):
+        by_angle.setdefault(round(float(np.arctan2(gravity[1], gravity[0])), FACING_DECIMALS), "")
+    order = sorted(by_angle)
+    angle = np.diff([*order, order[0] + 2.0 * np.pi])
     wide = int(np.argmax(angle))
     if angle[wide] < np.pi - OPEN:
         return []
-    a, b = (walls.name[straight[order[k % len(order)]]] for k in (wide, wide + 1))
+    a, b = (by_angle[order[k % len(order)]] for k in (wide, wide + 1))
     where = f"between wall {a!r} and wall {b!r}" if a != b else f"opposite wall {a!r}"
     return [f"The boundary is open {where}: no wall confines the rods there."]
 

@@ -122,7 +122,7 @@ def find_faults(evidence: Evidence) -> list[str]:
     if not evidence.unbalance <= unbalanced:  # NaN is no balance
         faults.append(
             f"pathological: the worst grain is out of balance by {evidence.unbalance:.2g} mean forces "
-            f"(> {unbalanced}): a contact is missing"
+            f"(> {unbalanced}): a contact of it may be missing, or it accelerates"
         )
     if not math.isnan(evidence.load_fraction) and not LOAD_FRACTIONS[0] <= evidence.load_fraction <= LOAD_FRACTIONS[1]:
         faults.append(

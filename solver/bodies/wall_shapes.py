@@ -213,9 +213,9 @@ def beside_another(endpoints: Array, side: Sides, point: Array) -> NDArray[np.bo
 def bounding_distance(endpoints: Array, side: Sides, point: Array) -> tuple[Array, Array]:
     """Return the distance of points from the walls that bound them, and the outward normals there.
 
-    A bar ends: what is past its end and beyond its line may be inside the packing, as rods are beside a footing or in
-    the other half of a box that is split. It is outside only if it is beyond another wall, too, or farther beyond than
-    the bar is long.
+    A bar ends: what is past its end and beyond its line may be inside the packing, as rods are beside a footing, in
+    the other half of a box that is split, or in a pit between two floors. It is outside only if it is not in front of
+    the wall that is nearest, and beyond another wall, too, or farther beyond than the bar is long.
 
     Parameters
     ----------
@@ -236,9 +236,13 @@ def bounding_distance(endpoints: Array, side: Sides, point: Array) -> tuple[Arra
     place = point[..., None, :]
     distance, normal = wall_distance(endpoints, side, place)
     past = ~beside_wall(endpoints, side, place, np.zeros(distance.shape))
+    from_ends = np.linalg.norm(endpoints - place[..., None, :], axis=-1).min(axis=-1)
+    nearest = np.where(past, from_ends, np.abs(distance)).argmin(axis=-1)[..., None]
+    in_front = np.take_along_axis(~past & (distance >= 0.0), nearest, axis=-1)
     alone = (distance < 0.0).sum(axis=-1, keepdims=True) == 1
     length = np.linalg.norm(endpoints[..., 1, :] - endpoints[..., 0, :], axis=-1)
-    return np.where(past & alone & (distance < 0.0) & (distance > -length), np.inf, distance), normal
+    inside = in_front | (alone & (distance > -length))
+    return np.where(past & inside & (distance < 0.0), np.inf, distance), normal
 
 
 def wall_displacement(former: Array, later: Array, side: Sides, at: Array | None = None) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
@@ -15,6 +16,8 @@ SAME_PLACE = 0.02  # radii: nearer places count as one
 FLAT = 1e4  # radius of the circle that replaces a wall, over that of the greatest rod
 AROUND = 0.35  # of its radius: greatest gap of bodies that may hold a rod
 ROUNDS = 30  # of re-weighting
+MOVED = 1.0  # radii by which a place may change in all rounds, with the bodies around its start
+LARGEST_STEP = 0.2  # radii in a round
 DRIFT = 0.1  # radii: standard deviation of a rod's motion relative to its neighbours between photographs
 
 
@@ -132,23 +135,9 @@ class Surroundings:
         The place x minimises Σ w g²/σ² + |x − start|²/(0.1 R)² by Gauss-Newton steps, g the gaps and σ their noise;
         w = 1 for overlaps, (1 + (g/s)²)⁻² for gaps, with s shrinking to the noise.
         """
-        drift, place, scale = DRIFT * size, start, AROUND * size
-        finest = 2.0 * self.noise + 1e-4 * size
-        information = np.eye(2) / drift**2
-        for _ in range(ROUNDS):
-            centre, rim = self._bodies(place, k, 2.0 * size)
-            apart = centre - place
-            distance = np.linalg.norm(apart, axis=1)
-            gap = distance - rim - size
-            near = gap < AROUND * size
-            gap, toward = gap[near], (apart / distance[:, None])[near]
-            # Wide gaps have little weight: those bodies may not touch.
-            weight = np.where(gap < 0.0, 1.0, 1.0 / (1.0 + (gap / scale) ** 2) ** 2) / self.noise**2
-            information = toward.T @ (weight[:, None] * toward) + np.eye(2) / drift**2
-            step = np.linalg.solve(information, toward.T @ (weight * gap) + (start - place) / drift**2)
-            place = place + step * min(1.0, 0.2 * size / max(float(np.hypot(*step)), 1e-300))
-            scale = max(finest, 0.7 * scale)
-        return place, float(np.sqrt(0.5 * np.trace(np.linalg.inv(information))))
+        centre, rim = self._bodies(start, k, (2.0 + MOVED) * size)
+        x, y, variance = _hold(centre, rim, start, size, self.noise)
+        return np.array([x, y]), float(np.sqrt(variance))
 
     def _bodies(self, place: Array, k: int, reach: float) -> tuple[Array, Array]:
         """Return centres (b, 2) and radii (b,) [m] of grains with rims within reach of a place and of all walls."""
@@ -168,6 +157,33 @@ class Surroundings:
     def _flat(self, depth: Array, outward: Array, near: Array) -> Array:
         """Compute centres (m, 2) of large circles that replace the wall at `depth` (m,) [m] beyond places (m, 2)."""
         return near + (depth + FLAT * self._widest)[:, None] * outward
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _hold(centre, rim, start, size, noise):
+    """Compute place x, y and mean variance of a rod among bodies (b, 2) with radii (b,), as `Surroundings.hold`."""
+    x, y, scale = start[0], start[1], AROUND * size
+    finest, prior = 2.0 * noise + 1e-4 * size, 1.0 / (DRIFT * size) ** 2
+    xx, xy, yy = prior, 0.0, prior
+    for _ in range(ROUNDS):
+        xx, xy, yy = prior, 0.0, prior
+        right_x, right_y = (start[0] - x) * prior, (start[1] - y) * prior
+        for b in range(len(rim)):
+            apart_x, apart_y = centre[b, 0] - x, centre[b, 1] - y
+            distance = np.sqrt(apart_x**2 + apart_y**2)
+            gap = distance - rim[b] - size
+            if gap < AROUND * size:
+                # Wide gaps have little weight: those bodies may not touch.
+                weight = (1.0 if gap < 0.0 else 1.0 / (1.0 + (gap / scale) ** 2) ** 2) / noise**2
+                u, v = apart_x / distance, apart_y / distance
+                xx, xy, yy = xx + weight * u * u, xy + weight * u * v, yy + weight * v * v
+                right_x, right_y = right_x + weight * gap * u, right_y + weight * gap * v
+        determinant = xx * yy - xy * xy
+        step_x, step_y = (yy * right_x - xy * right_y) / determinant, (xx * right_y - xy * right_x) / determinant
+        part = min(1.0, LARGEST_STEP * size / max(np.sqrt(step_x**2 + step_y**2), 1e-300))
+        x, y = x + part * step_x, y + part * step_y
+        scale = max(finest, 0.7 * scale)
+    return x, y, 0.5 * (xx + yy) / (xx * yy - xy * xy)
 
 
 def _cross(one: Array, first: Array, two: Array, second: Array) -> Array:

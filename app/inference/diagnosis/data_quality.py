@@ -30,6 +30,10 @@ REFERENCE_STEP = math.radians(0.25)
 HIDING_NOISE = 0.5  # noise over motion above which the motion has almost no information
 SUFFICIENT_NOISE = 0.25  # the same below which it has enough
 NO_SLIDING = 0.02  # fraction of sliding contacts below which the motion does not determine forces
+# Fraction of sliding contacts from which on friction is tested: forces that only push explain the noise of contacts at
+# rest worse than forces of either sign. Sheared packings slide at .2 and more; under a rising pressure, or nearly
+# jammed, at less than .06, and there causes were named wrongly.
+FEW_SLIDING = 0.1
 COARSE_STEPS = 2.0  # reference steps beyond which forces cannot be followed
 AMBIGUOUS = (0.05, 0.95)  # P(touch) between which a pair is ambiguous
 TOUCHING = 0.5  # P(touch)
@@ -63,7 +67,7 @@ class DataQuality:
         return self.gap_sd > UNCLEAR_GAPS * self.diameter
 
     def describe(self) -> list[str]:
-        """Describe noise, motion and gaps in one to three sentences."""
+        """Describe noise, motion, sliding and gaps in one to four sentences."""
         step = math.degrees(self.shear)
         stated = "" if self.noise == self.stated_noise else f" (stated: {1e6 * self.stated_noise:.3g} µm)"
         lines = [
@@ -72,6 +76,8 @@ class DataQuality:
             f"{_percent(self.sliding)} of the contacts slide by more than noise; {_percent(self.ambiguous)} of the "
             "candidate pairs are ambiguous: touching or not."
         ]
+        if self.sliding <= FEW_SLIDING:
+            lines.append("Too few slide to test the friction of rods and walls: it is used as given.")
         if self.gap_offset > VISIBLE_OFFSET * self.diameter:
             lines.append(
                 f"Touching grains have a mean gap of {1e6 * self.gap_offset:.3g} µm, "

@@ -12,12 +12,10 @@ from ...solver.convex.resistance import FRAMES, Resistance, base_drag_of, find_i
 from ...solver.nlgs.chain import ChainSettings, force_scale
 from ..corrected_sequence import CorrectedSequence
 from .causes import finding
-from .data_quality import measure_data_quality
+from .data_quality import FEW_SLIDING, measure_data_quality
 
-# Fraction of the contacts that slide beyond noise, from which on causes are named that act where they slide: forces
-# that only push explain the noise of contacts at rest worse than forces of either sign. Sheared packings slide at .2
-# and more; under a rising pressure, or nearly jammed, at less than .06, and there causes were named wrongly.
-LEAST_SLIDING = dict.fromkeys(("friction", "wall_friction", "adhesion"), 0.1) | {
+# Fraction of the contacts that slide beyond noise, from which on causes are named that act where they slide.
+LEAST_SLIDING = dict.fromkeys(("friction", "wall_friction", "adhesion"), FEW_SLIDING) | {
     # The wrong sense of all sliding shows with fewer: at .06 to .1 it lowered what contradicts the sliding to .2 to .5,
     # and was the best explanation of correct input only where at most .01 slide.
     "photographs_reversed": 0.05,

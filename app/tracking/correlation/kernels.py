@@ -340,6 +340,15 @@ def _compose(pose, tx, ty, tr, radius):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _scale_quantile(values):
+    """Quantile SCALE_QUANTILE of values (n,), between the nearest two; NumPy's own takes 10 s more to compile."""
+    ordered = np.sort(values)
+    at = SCALE_QUANTILE * (len(values) - 1)
+    k = int(at)
+    return ordered[k] + (at - k) * (ordered[min(k + 1, len(values) - 1)] - ordered[k])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def fit_robust(coefficients, data, radius, max_shift, noise, gain, offset, limit, pose, fit, covariance):
     """Refit one patch with Tukey's weights.
 
@@ -386,7 +395,7 @@ def fit_robust(coefficients, data, radius, max_shift, noise, gain, offset, limit
             ix, iy = int(x), int(y)
             g[p] = read_quintic(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy))
             misfit[p] = abs(g[p] - a * data[p, 2] - b)
-        scale = max(np.quantile(misfit, SCALE_QUANTILE) / NORMAL_QUANTILE, noise)
+        scale = max(_scale_quantile(misfit) / NORMAL_QUANTILE, noise)
         if step == ROBUST_CHECK_STEP and scale > MAX_MISFIT * a / np.sqrt(count):
             fit[CODE] = DIVERGED
             fit[ZNCC] = 0.0

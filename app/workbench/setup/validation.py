@@ -33,6 +33,7 @@ from ...experiment.reading.photograph_order import MissingNumbers, missing_numbe
 from ...experiment.scaling import make_scale
 from ...experiment.units import Scale
 from ...experiment.walls import read_walls
+from ...process.counts import state_count
 from ...process.errors import InputError
 from ...solver.bodies.wall_shapes import bounding_distance
 from ...tracking.missed_rods import describe_missed_rods
@@ -255,8 +256,7 @@ def _validate_order(found: ValidationResult, experiment: Experiment) -> None:
 @lru_cache(maxsize=16)
 def _shape_of(file: Path, _changed: int, _size: int, most: int, channel: Channel) -> tuple[int, int]:
     """Rows and columns of a photograph, which is read once as long as its file is the same."""
-    image = read_photograph(file, max_pixels=most, channel=channel)
-    return image.shape[0], image.shape[1]
+    return read_photograph(file, max_pixels=most, channel=channel).shape[:2]
 
 
 def _validate_rods(found: ValidationResult, experiment: Experiment) -> None:
@@ -295,12 +295,12 @@ def _warn_of_small(found: ValidationResult) -> None:
 
 
 def _validate_walls(found: ValidationResult, experiment: Experiment) -> None:
-    walls, step = found.walls, found.steps["walls"]
+    config, walls, step = experiment.config, found.walls, found.steps["walls"]
     if walls is None:
         return
     if not walls.loaded.any():
         step.add_warning("No wall has a pressure: forces are known only up to their scale.")
-    for sentence in open_sides(walls.frames(0, 1)) if experiment.config.boundary is None else ():
+    for sentence in open_sides(walls.frames(0, 1), config.material.gravity) if config.boundary is None else ():
         step.add_warning(sentence)
     if found.rods is None:
         return
@@ -317,7 +317,7 @@ def _validate_walls(found: ValidationResult, experiment: Experiment) -> None:
         step.add_error(_without_file(experiment.folder, error))
         return
     for name, count in rods_cut_by_walls(tracks, first).items():
-        step.add_error(f"Wall {name!r} cuts through {count} rod{'s' if count > 1 else ''}: move it to their rims.")
+        step.add_error(f"Wall {name!r} cuts through {state_count(count, 'rod')}: move it to their rims.")
     for sentence in (*rods_beyond_ends(tracks, first), *implausible_loads(experiment, tracks, first)):
         step.add_warning(sentence)
 

@@ -11,6 +11,7 @@ from rodsight.experiment.plausibility import (
     check_inside,
     expected_rods,
     neighbour_spacing,
+    open_sides,
     rods_beyond_ends,
     rods_cut_by_walls,
 )
@@ -92,3 +93,22 @@ def test_one_wrong_place_of_a_later_photograph_is_not_blamed_on_the_walls() -> N
     with pytest.raises(InputError, match="beyond it") as refused:
         check_inside(SOURCES, tracks, walls)
     assert "look" not in str(refused.value)
+
+
+STEP = np.array([[0.0, 0.1], [0.0, 0.0], [0.05, 0.0], [0.05, -0.03], [0.1, -0.03], [0.1, 0.1]])
+STEP_NAMES = ("left", "floor", "step", "lower floor", "right")
+
+
+@pytest.mark.parametrize(
+    ("gravity", "expected"),
+    [
+        ((0.0, 0.0), ["between wall 'right' and wall 'left'"]),  # the step faces as the left wall does, farther inside
+        ((0.0, 9.81), ["between wall 'right' and wall 'left'"]),  # upwards: weight does not hold the rods
+        ((0.0, -9.81), []),
+    ],
+)
+def test_weight_closes_a_boundary_as_a_lid_would(gravity, expected) -> None:
+    walls = WallTracks(STEP_NAMES, np.stack([STEP[:-1], STEP[1:]], axis=1)[None], np.full(5, np.nan))
+    found = open_sides(walls, gravity)
+    assert [where for where in expected if where not in found[0]] == []
+    assert len(found) == len(expected)

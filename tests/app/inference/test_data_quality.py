@@ -30,6 +30,8 @@ def test_what_hides_the_forces_is_named_with_a_cure(change, reason):
 def test_unknown_sliding_coarse_steps_and_a_wrong_stated_noise_are_reported():
     assert "an unknown fraction of the contacts" in replace(GOOD, sliding=math.nan).describe()[0]
     assert "(stated: 50 µm)" in replace(GOOD, stated_noise=5e-5).describe()[0]
+    assert replace(GOOD, sliding=0.1).describe()[1].startswith("Too few slide to test the friction")
+    assert len(replace(GOOD, sliding=0.11).describe()) == 1
     assert "steps of 0.25°" in replace(GOOD, shear=4 * REFERENCE_STEP).describe()[1]
 
 

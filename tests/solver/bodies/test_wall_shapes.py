@@ -262,3 +262,13 @@ def test_a_grain_past_the_end_of_one_wall_is_not_beyond_it() -> None:
     assert normal.shape == (4, 3, 2)
     far = bounding_distance(corner[:1], None, np.array([[0.35, 0.15], [0.25, 0.15]]))[0]
     assert far[:, 0] == pytest.approx([-0.15, np.inf])  # the first is farther away than the wall is long
+
+
+def test_floors_of_different_heights_bound_what_is_in_front_of_them() -> None:
+    corners = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, -0.03], [0.2, -0.03], [0.2, 0.0], [0.3, 0.0]])
+    pit = np.stack([corners[:-1], corners[1:]], axis=1)  # left floor, step, floor of the pit, step, right floor
+    place = np.array([[0.15, -0.02], [0.05, 0.01], [0.101, -0.001], [0.05, -0.01], [0.15, -0.035]])
+    distance, _ = bounding_distance(pit, None, place)
+    assert (distance[:3] > 0.0).all()  # in the pit, beyond the lines of both floors; above a floor, far from the steps
+    assert distance[3, 0] == pytest.approx(-0.01)  # in the ground beneath the left floor
+    assert distance[4, 2] == pytest.approx(-0.005)
