@@ -47,6 +47,17 @@ MUTANTS = [
         ("(np.abs(distance - radius) < overlap)", "(np.abs(distance - radius) < 0.0)"),
         ("circle_ends(centre - moved.mean(axis=-2), radius - widened", "circle_ends(centre, radius - widened"),
         ("walls_before(two, (1.0 - fraction) * wall_displacement", "walls_before(two, fraction * wall_displacement"),
+        ("inside = in_front | (alone", "inside = (alone"),
+        ("(alone & (distance > -length))", "alone"),
+        ("np.where(past, from_ends, np.abs(distance)).argmin", "np.abs(distance).argmin"),
+        ("(~past & (distance >= 0.0), nearest", "(~past, nearest"),
+    ),
+    *mutants_of(
+        "solver/inferred/surroundings.py",
+        "tests/solver/inferred/test_unseen_rods.py",
+        ("right_x, right_y = right_x + weight * gap * u", "right_x, right_y = right_x - weight * gap * u"),
+        ("(1.0 if gap < 0.0 else 1.0 / (1.0 + (gap / scale) ** 2) ** 2)", "1.0"),
+        ("0.5 * (xx + yy) / (xx * yy - xy * xy)", "0.5 / (xx + yy)"),
     ),
     *mutants_of(
         "solver/bodies/packing.py",

@@ -272,3 +272,4 @@ def test_floors_of_different_heights_bound_what_is_in_front_of_them() -> None:
     assert (distance[:3] > 0.0).all()  # in the pit, beyond the lines of both floors; above a floor, far from the steps
     assert distance[3, 0] == pytest.approx(-0.01)  # in the ground beneath the left floor
     assert distance[4, 2] == pytest.approx(-0.005)
+    assert np.isfinite(distance[4]).all()  # behind the nearest wall: outside of both floors, too

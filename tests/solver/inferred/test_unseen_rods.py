@@ -96,6 +96,8 @@ def test_hole_that_other_rods_enter_holds_no_rod() -> None:
     held = ring(closing=0.0)
     assert held.count == 1
     assert held.position == pytest.approx(0.0, abs=1e-6)
+    # six gaps in all directions, and its motion relative to its neighbours, a tenth of its radius
+    assert held.sigma == pytest.approx(1.0 / np.sqrt(3.0 / NOISE**2 + 1.0 / 8e-4**2), rel=1e-3)
     assert ring(closing=0.1).count == 0
 
 
