@@ -20,6 +20,7 @@ from ...solver.assessment.expected_correlation import BY_SLIDING, CLOSED, LEAST,
 from ...solver.assessment.intervals.scale_sd import FIRST_BY_SECOND, TABLE, TERMS
 from ...solver.assessment.intervals.scale_sd import LEAST as LEAST_SCALE_SD
 from ...solver.bodies.grains import Array
+from ...solver.frame_forces import FrameStatus
 from ...synthetic.scenarios.preset_names import Group, ScenarioName
 from ...synthetic.scenarios.scenario_table import SCENARIOS
 from ..fitting.additive_fit import AdditiveFit, correlation_target, fit_additive
@@ -28,6 +29,8 @@ from ..fitting.scale_fit import ScaleSample, describe_scale, fit_first, scale_sd
 from .scenario_score import TRUST_TOLERANCE, ScenarioScore
 
 GROUPS: tuple[Group, ...] = ("correct", "missing physics", "wrong input")
+STATUSES = tuple(each.name.lower() for each in FrameStatus if each not in (FrameStatus.RESET, FrameStatus.FAILED))
+MEANINGFUL = 0.9  # trust from which on single forces are meaningful
 # Kinds that no fit reads: of each group some, and of each mechanism at most one.
 LEFT_OUT = frozenset({
     "step_1", "circle", "corners", "radii_03", "strong_cohesion", "rolling", "stiff_moving", "theta_sign", "aspect_03",
@@ -53,10 +56,9 @@ SOFT = 1.9e6  # [N/m] stiffness of contacts below which overlaps are forces
 SETTLED_SCALE = 3  # first photograph whose scale is judged
 SETTLED = 2  # first photograph of a trial solution that is judged
 FOLDS = 6  # groups of kinds that are left out in turn
-ONLY_UNLOADED = "undetermined", "noise", "few_interior"
 # The fits, each with the measures that it weighs.
 FITS: dict[str, tuple[str, ...]] = {
-    "both": tuple(name for name in MEASURES if name not in ONLY_UNLOADED),
+    "both": tuple(name for name in MEASURES if name not in ("undetermined", "noise", "few_interior")),
     "unloaded": tuple(name for name in MEASURES if name not in ("load_mismatch", "inertial_number")),
     "motion": (
         "correction", "previous_residual", "disagreement_of_members", "gap_error", "force_change", "power_gap",
@@ -93,7 +95,7 @@ class TrustSample:
     seed: NDArray[np.int64]  # (f,)
     frame: NDArray[np.int64]  # (f,)
     group: NDArray[np.str_]  # (f,)
-    suspect: NDArray[np.bool_]  # (f,)
+    status: NDArray[np.str_]  # (f,)
     overlaps: NDArray[np.bool_]  # (f,) whether the forces follow from the overlaps of soft grains
     loaded: NDArray[np.bool_]  # (f,) whether a known load, or weight alone, bears on the grains
     r: Array  # (f,)
@@ -147,7 +149,7 @@ class TrustSample:
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> TrustSample:
         """The chosen frames."""
         return TrustSample(
-            self.kind[chosen], self.seed[chosen], self.frame[chosen], self.group[chosen], self.suspect[chosen],
+            self.kind[chosen], self.seed[chosen], self.frame[chosen], self.group[chosen], self.status[chosen],
             self.overlaps[chosen], self.loaded[chosen], self.r[chosen], self.trust[chosen], self.expected[chosen],
             {name: each[chosen] for name, each in self.measures.items()},
         )  # fmt: skip
@@ -189,8 +191,7 @@ class TrustFit:
 def fit_expected(sample: TrustSample, names: Sequence[str]) -> TrustFit:
     """Fit the expected correlation by measures, and its bound on seeds and kinds left out in turn."""
     whole, score = _fit_leaving_out(sample, names)
-    error = correlation_target(sample.r) - score
-    frames = JudgedFrames(sample.r, score, error, sample.weight, sample.fold())
+    frames = JudgedFrames(sample.r, score, correlation_target(sample.r) - score, sample.weight, sample.fold())
     groups = [sample.group == group for group in GROUPS]
     return TrustFit(whole, fit_bound(frames, groups, LIMITS))
 
@@ -380,16 +381,17 @@ def print_trust(console: Console, title: str, sample: TrustSample) -> None:
                 f"{some.expected.mean():.3f}", f"{some.trust.mean():.2f}", *_fractions(some),
             )  # fmt: skip
     console.print(table)
-    for group in (*GROUPS, "all", "suspect"):
-        chosen = sample.suspect if group == "suspect" else np.ones(len(sample.r), np.bool_)
-        some = sample.select(chosen if group in ("all", "suspect") else sample.group == group)
+    for group in (*GROUPS, "all", *STATUSES):
+        some = sample.select((group == "all") | (sample.group == group) | (sample.status == group))
         if len(some.r) < 3:
             continue
-        high, low = _fractions(some)
-        order = float(np.asarray(spearmanr(some.trust, some.r))[0])
+        (high, low), order = _fractions(some), float(np.asarray(spearmanr(some.trust, some.r))[0])
+        sure = some.r[some.trust >= MEANINGFUL]
+        tenth = float(np.quantile(sure, 0.1)) if len(sure) else math.nan
         console.print(
             f"{group}: {len(some.r)} frames, T > r + .03 in {high}, T < r − .15 in {low}, Spearman of T and r "
-            f"{order:.2f}, median |expected − r| {np.median(np.abs(some.expected - some.r)):.3f}", highlight=False,
+            f"{order:.2f}, median |expected − r| {np.median(np.abs(some.expected - some.r)):.3f}; {len(sure)} have T ≥ "
+            f"{MEANINGFUL:g}, and a tenth of these r < {tenth:.2f}", highlight=False, soft_wrap=True,
         )  # fmt: skip
 
 
