@@ -265,7 +265,7 @@ def _frame_table(summary: dict[str, Any]) -> Table:
     table = Table(title=summary["name"], box=None, header_style="bold", pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("frame", justify="right")
     table.add_column("status")
-    for heading in ("contacts", "z", "φ/°", "⟨f_n⟩/N", "residual", "ε", "trust"):
+    for heading in ("contacts", "z", "φ/°", "⟨f_n⟩/N", "nat. map", "ε", "trust"):
         table.add_column(heading, justify="right", no_wrap=True)
     truth = summary.get("accuracy")
     if truth:
