@@ -12,7 +12,7 @@ from typing import Any
 
 from ..experiment.config.unused_keys import refuse_unused_keys
 from ..experiment.experiment import CONFIG_NAME, load_experiment
-from ..process.errors import InputError
+from ..process.errors import InputError, MissingFileError
 from ..process.frame_range import ALL_FRAMES, FrameRange
 
 EXPERIMENT, NAME, FRAMES = "experiment", "name", "frames"  # columns; all others are keys of experiment.toml
@@ -74,6 +74,8 @@ def _rows(table: Path) -> Iterator[tuple[int, dict[str, str]]]:
     """Yield the rows with their line numbers."""
     try:
         text = table.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise MissingFileError(table, "", "there is no such file") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(table, "", f"cannot be read ({getattr(error, 'strerror', None) or 'not UTF-8'})") from None
     lines = csv.reader(io.StringIO(text))

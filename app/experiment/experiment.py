@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..process.errors import InputError
+from ..process.errors import InputError, MissingFileError
 from ..solver.bodies.cell import unwrap_cell
 from ..solver.bodies.grains import Array
 from ..tracks import Tracks, TrackStatus, held_once
@@ -167,7 +167,7 @@ def load_experiment(path: Path, settings: Sequence[str] = (), *, root: Path | No
     """
     file = path / CONFIG_NAME if path.is_dir() else path
     if not file.exists():
-        raise InputError(file, "", "there is no such file; an experiment is a folder with experiment.toml")
+        raise MissingFileError(file, "", "there is no such file; an experiment is a folder with experiment.toml")
     inputs = InputFiles(root)
     config = load_config(file, tuple(settings), inputs)
     return Experiment(file, config, inputs, settings_of_file(inputs.read(file, text=True)))

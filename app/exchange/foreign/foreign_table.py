@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ...experiment.reading.input_files import regular
 from ...experiment.reading.tables import Table
-from ...process.errors import InputError
+from ...process.errors import InputError, MissingFileError
 
 PARQUET = b"PAR1"
 COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
@@ -83,7 +83,7 @@ def read_text(file: Path) -> str:
     try:
         content = regular(file).read_bytes()
     except FileNotFoundError:
-        raise InputError(file, "", "there is no such file") from None
+        raise MissingFileError(file, "", "there is no such file") from None
     except OSError as error:
         raise InputError(file, "", f"cannot be read ({error.strerror})") from None
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -106,7 +106,7 @@ def _open(file: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
         with regular(file).open("rb") as stream:
             start = stream.read(4)
     except FileNotFoundError:
-        raise InputError(file, "", "there is no such file") from None
+        raise MissingFileError(file, "", "there is no such file") from None
     except OSError as error:
         raise InputError(file, "", f"cannot be read ({error.strerror})") from None
     return _open_parquet(file) if start == PARQUET else _open_text(file)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...process.errors import InputError
+from ...process.errors import InputError, MissingFileError
 from ...solver.bodies.grains import Array
 
 CAMERA = ("camera_matrix", "Camera_Matrix", "cameraMatrix", "mtx", "K", "M1")
@@ -40,7 +40,7 @@ def read_calibration(file: Path, shape: tuple[int, int] | None = None) -> dict[s
         The file is no calibration, or one of another model or of other photographs.
     """
     if not file.is_file():
-        raise InputError(file, "", "there is no such file")
+        raise MissingFileError(file, "", "there is no such file")
     found = _arrays_of_numpy(file) if file.suffix.lower() == ".npz" else _arrays_of_opencv(file)
     matrix = _named(found, CAMERA)
     if matrix is None or matrix.shape != (3, 3):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...experiment.experiment import GrainGuess
 from ...process.counts import state_count
-from ...process.errors import InputError
+from ...process.errors import InputError, MissingFileError
 from ...solver.bodies.grains import Array
 from ..foreign.foreign_table import column_names, read_foreign
 
@@ -46,7 +46,7 @@ def read_rods(file: Path, shape: tuple[int, int]) -> tuple[GrainGuess, list[str]
         The file cannot be read or holds no rods.
     """
     if not file.is_file():
-        raise InputError(file, "", "there is no such file")
+        raise MissingFileError(file, "", "there is no such file")
     if file.suffix.lower() in PICTURES:
         labels = _read_labels(file)
         if labels.shape != shape:

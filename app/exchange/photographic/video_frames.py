@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ...process.atomic import replacing_folder
-from ...process.errors import InputError
+from ...process.errors import InputError, MissingFileError
 from ...process.frame_range import ALL_FRAMES, FrameRange
 
 SUFFIXES = frozenset((".mp4", ".avi", ".mov", ".mkv", ".m4v", ".mpg", ".mpeg", ".wmv", ".webm"))
@@ -61,7 +61,7 @@ def extract_frames(
     import cv2  # imported late: it takes a tenth of a second
 
     if not video.is_file():
-        raise InputError(video, "", "there is no such file")
+        raise MissingFileError(video, "", "there is no such file")
     if folder.exists():
         raise InputError(folder, "", "exists already: remove it, or name its photographs instead of the video")
     stream = cv2.VideoCapture(str(video))

@@ -11,7 +11,7 @@ import tomli_w
 from pydantic import Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
-from ...process.errors import InputError
+from ...process.errors import InputError, MissingFileError
 from ..reading.input_files import InputFiles
 from .corrections import correct_value, explain_line
 from .input_sections import BoundarySection, GivenTracks, PhotographsSection, WallsSection
@@ -69,7 +69,7 @@ def load_config(file: Path, settings: Sequence[str] = (), inputs: InputFiles | N
     try:
         text = (InputFiles() if inputs is None else inputs).read(file, text=True).decode("utf-8")
     except FileNotFoundError:
-        raise InputError(file, "", "there is no such file") from None
+        raise MissingFileError(file, "", "there is no such file") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(file, "", f"cannot be read ({error})") from None
     try:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...process.atomic import replacing
 from ...process.counts import state_count
-from ...process.errors import InputError
+from ...process.errors import InputError, MissingFileError
 from .column_names import refuse_likely_names
 from .input_files import InputFiles
 from .plain_rows import Cells, split_plain
@@ -173,7 +173,7 @@ def read_table(
                 for name, at in zip(columns, place, strict=True):
                     values[name].append(row[at].strip())
     except FileNotFoundError:
-        raise InputError(file, "", "there is no such file") from None
+        raise MissingFileError(file, "", "there is no such file") from None
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(file, "", f"cannot be read ({error})") from None
     if not line:

@@ -143,9 +143,9 @@ def _trust(frames: list[FrameSummary]) -> str:
     return (
         "## How far to trust it\n\n| | |\n|---|---|\n"
         + "\n".join(f"| {name} | {value} |" for name, value in rows)
-        + "\n\nT is a lower bound of the correlation with the true forces, by the evidence of the frame and by what was "
-        "found wrong: errors of the input that leave no trace are not included. It holds in every status, which names "
-        "what happened to the packing."
+        + "\n\nT is a lower bound of the correlation with the true forces, by the evidence of the frame and by what "
+        "was found wrong: errors of the input that leave no trace are not included. It holds in every status, which "
+        "names what happened to the packing."
     )
 
 

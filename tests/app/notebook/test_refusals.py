@@ -36,6 +36,8 @@ def run(examples: Path) -> rodsight.Run:
     ("kind", "call"),
     [
         (FileNotFoundError, lambda run: rodsight.open("nosuch")),
+        (FileNotFoundError, lambda run: rodsight.run("nosuch")),
+        (FileNotFoundError, lambda run: rodsight.campaign("nosuch.csv")),
         (FileNotFoundError, lambda run: rodsight.score("nosuch")),
         (FileNotFoundError, lambda run: rodsight.compare(run, "nosuch")),
         (IndexError, lambda run: run.contacts(frame=99)),
