@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
@@ -17,8 +19,26 @@ from ..experiment.reading.tables import Table
 from ..process.errors import InputError
 from ..process.frame_range import FrameRange
 
+OPTION = re.compile(r"--([a-z][a-z-]*)")  # of the command line, in a message
+CALLED_OTHERWISE = {"scheduler": "workers"}  # arguments by the names of their options, where these differ
 OPTIONAL = "theta"  # column whose values may be NaN
 WHOLE = ("frame", "id")  # columns of whole numbers, which data frames may store as floats
+
+
+@contextmanager
+def arguments_named() -> Iterator[None]:
+    """Name options of the command line as arguments in bad input of the block; those of a whole command stay."""
+    try:
+        yield
+    except InputError as error:
+        if "rodsight " not in str(error):
+            error.args = (OPTION.sub(_argument_of, str(error)),)
+        raise
+
+
+def _argument_of(option: re.Match[str]) -> str:
+    name = option[1].replace("-", "_")
+    return CALLED_OTHERWISE.get(name, name)
 
 
 def as_strings(settings: Mapping[str, object], name: str = "settings") -> list[str]:

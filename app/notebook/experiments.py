@@ -19,7 +19,7 @@ from ..process.progress import Progress
 from ..run_folder import Run as RunFolder
 from ..run_folder import hold_run
 from ..tracks import Tracks, TrackStatus
-from .arguments import as_frames, as_strings, is_number
+from .arguments import arguments_named, as_frames, as_strings, is_number
 from .made_runs import run
 from .run import Run
 from .shown_progress import shown_progress
@@ -47,6 +47,7 @@ class InitOptions(TypedDict, total=False):
     grains: str | PathLike[str]
 
 
+@arguments_named()
 def init(folder: str | PathLike[str], photographs: str, **options: Unpack[InitOptions]) -> pd.DataFrame:
     """Set up an experiment from photographs, as `rodsight init`.
 

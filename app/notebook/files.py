@@ -23,6 +23,7 @@ from ..exported_files import (
 )
 from ..process.errors import InputError, naming
 from ..run_folder import RECORDING
+from .arguments import arguments_named
 from .comparisons import Source, as_run
 from .shown_progress import shown_progress
 
@@ -64,6 +65,7 @@ class ExportOptions(TypedDict, total=False):
     width: Literal["single", "double"]
 
 
+@arguments_named()
 def import_table(
     source: str | PathLike[str] | pd.DataFrame,
     folder: str | PathLike[str],
@@ -142,6 +144,7 @@ def import_table(
     return table
 
 
+@arguments_named()
 def export(
     what: ExportKind, results: Source, out: str | PathLike[str] | None = None, **options: Unpack[ExportOptions]
 ) -> list[Path]:

@@ -25,12 +25,13 @@ from ..robustness.execution import reach_scheduler
 from ..run_folder import Run as RunFolder
 from ..run_folder import hold_run
 from ..solver.parallel import available_cores
-from .arguments import as_strings
+from .arguments import arguments_named, as_strings
 from .shown_progress import shown_progress
 
 TABLE = "campaign.csv"  # of a campaign given as a data frame, in its folder
 
 
+@arguments_named()
 def sensitivity(
     experiment: str | PathLike[str],
     *,
@@ -115,6 +116,7 @@ def sensitivity(
     return table
 
 
+@arguments_named()
 def campaign(
     table: str | PathLike[str] | pd.DataFrame,
     *,

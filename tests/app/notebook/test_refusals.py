@@ -70,6 +70,18 @@ def test_a_run_without_a_recording_is_a_missing_file(run, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"factors": ["nosuch"]}, "^factors: nosuch: is not a factor"),
+        ({"factors": ["friction"], "samples": 1}, "^samples: 1: is too few"),
+    ],
+)
+def test_a_study_names_arguments_instead_of_options(made_tracks, tmp_path, options, words):
+    with pytest.raises(rodsight.InputError, match=words):
+        rodsight.sensitivity(made_tracks, out=tmp_path, **options)
+
+
+@pytest.mark.parametrize(
     ("what", "options", "words"),
     [
         ("tables", {"kind": "xml"}, r"^export: kind 'xml': is not one of csv, parquet$"),
@@ -78,8 +90,8 @@ def test_a_run_without_a_recording_is_a_missing_file(run, tmp_path):
         ("figures", {"formats": "xml"}, r"^export: formats 'xml': is not one of pdf, svg, png$"),
         ("figures", {"width": "triple"}, r"^export: width 'triple': is not one of single, double$"),
         ("pictures", {"timeline": "year"}, r"^export: timeline 'year': is not one of frame, sweep$"),
-        ("pictures", {"size": (1, 1)}, r"^--size: 1x1: is not WIDTHxHEIGHT in pixels from 100 to 8192$"),
-        ("pictures", {"step": 0}, r"^--step: 0: is not a positive number$"),
+        ("pictures", {"size": (1, 1)}, r"^size: 1x1: is not WIDTHxHEIGHT in pixels from 100 to 8192$"),
+        ("pictures", {"step": 0}, r"^step: 0: is not a positive number$"),
     ],
 )
 def test_an_export_with_wrong_options_is_refused_before_anything_is_written(run, what, options, words, tmp_path):
