@@ -27,6 +27,7 @@ from ..solver.calibration.gaps import MeasuredSequence
 from ..tracks import Tracks, WallTracks
 from .boundary import free_surfaces
 from .config.corrections import DIGITS, GREATEST_RADIUS, SOLID_DENSITIES, look_like_millimetres
+from .config.tuning_sections import MaterialSection
 from .experiment import Experiment
 
 NEIGHBOURS = 8  # nearest centres of a grain, which include the one closest in units of radii
@@ -81,7 +82,7 @@ def check_packing(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> 
     return [
         *rods_beyond_ends(tracks, walls),
         *implausible_density(experiment.config.material.density),
-        *implausible_loads(experiment, tracks, walls),
+        *implausible_loads(experiment.config.material, tracks, walls),
         *(open_sides(walls, experiment.config.material.gravity) if bounded_by_walls else []),
         *free_surfaces(experiment, tracks, walls),
     ]
@@ -139,12 +140,12 @@ def implausible_density(density: float) -> list[str]:
     ]
 
 
-def implausible_loads(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> list[str]:
+def implausible_loads(material: MaterialSection, tracks: Tracks, walls: WallTracks) -> list[str]:
     """Return a warning for every pressure or load that is possible but implausible: very small, or above STRENGTH.
 
     A very small load is less than a tenth of the pressure of the rods' own weight, if they lay upon one another.
     """
-    material, sentences = experiment.config.material, []
+    sentences = []
     here = tracks.present[0]
     width = float(np.ptp(tracks.position[0, here, 0])) if here.any() else 0.0
     if width <= 0.0:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..solver.bodies.rods import RodMaterial
 from ..solver.contacts.verdicts import Verdicts
@@ -23,6 +24,7 @@ class Inputs:
     material: RodMaterial = field(default_factory=RodMaterial)
     settings: InferenceSettings = field(default_factory=InferenceSettings)
     verdicts: Mapping[int, Verdicts] = field(default_factory=dict)  # of reviewers, by row of the frame
+    placed: NDArray[np.bool_] | None = None  # (f, n) poses that are where somebody put them: no outliers
 
     def with_base_friction(self, coefficient: float) -> Inputs:
         """Fix the friction coefficient of the base, which is then not measured again."""

@@ -91,9 +91,17 @@ def as_frame(name: str, columns: object) -> pd.DataFrame:
     if not isinstance(columns, pd.DataFrame | Mapping):
         raise InputError(name, f"{type(columns).__name__}", "is neither a data frame nor a mapping of columns")
     try:
-        return pd.DataFrame(columns)
-    except ValueError as error:
+        frame = pd.DataFrame(columns)
+    except (ValueError, TypeError) as error:
         raise InputError(name, "", f"is no table: {error}") from None
+    twice = frame.columns[frame.columns.duplicated()]
+    if len(twice):
+        raise InputError(name, f"column {twice[0]}", "stands twice")
+    foreign = [column for column in frame if not getattr(frame[column].dtype, "isnative", True)]
+    for column in foreign:  # pandas sorts and compares the own byte order only
+        array = np.asarray(frame[column])
+        frame = frame.assign(**{str(column): array.astype(array.dtype.newbyteorder("="))})
+    return frame
 
 
 def as_table(name: str, frame: pd.DataFrame, columns: Sequence[str]) -> Table:
@@ -108,6 +116,7 @@ def as_table(name: str, frame: pd.DataFrame, columns: Sequence[str]) -> Table:
 
 def _texts(column: str, values: Iterable[Any]) -> list[str]:
     array = np.asarray(values)
-    if column in WHOLE and array.dtype.kind == "f" and np.all(array == np.floor(array)):
-        array = array.astype(np.int64)
-    return ["" if column == OPTIONAL and each != each else str(each) for each in array.tolist()]  # NaN: unknown
+    texts = ["" if column == OPTIONAL and each != each else str(each) for each in array.tolist()]  # NaN: unknown
+    if column in WHOLE and array.dtype.kind == "f":
+        texts = [text.removesuffix(".0") for text in texts]
+    return texts

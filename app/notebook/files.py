@@ -23,13 +23,13 @@ from ..exported_files import (
 )
 from ..process.errors import InputError, naming
 from ..run_folder import RECORDING
-from .arguments import arguments_named
+from .arguments import arguments_named, as_mapping, is_number
 from .comparisons import Source, as_run
 from .shown_progress import shown_progress
 
 DRAWN = ("pictures", "video")
 FIGURES = "figures"
-DATA_FRAME = "data frame"  # its name in messages
+DATA_FRAME, WALL_FRAME = "data frame", "data frame of walls"  # their names in messages
 
 
 class ImportOptions(TypedDict, total=False):
@@ -43,8 +43,10 @@ class ImportOptions(TypedDict, total=False):
     radius: float
     interval: float
     precision: float
-    walls: str
+    walls: str | PathLike[str] | pd.DataFrame
     pressure: Mapping[str, float]
+    load: Mapping[str, float]
+    corner_radius: float
     pairs: str | PathLike[str]
 
 
@@ -69,7 +71,7 @@ class ExportOptions(TypedDict, total=False):
 def import_table(
     source: str | PathLike[str] | pd.DataFrame,
     folder: str | PathLike[str],
-    columns: Mapping[str, str] | None = None,
+    columns: Mapping[str, str | int] | None = None,
     **options: Unpack[ImportOptions],
 ) -> pd.DataFrame:
     """Convert a table of another program to an experiment folder, as `rodsight import`.
@@ -80,8 +82,8 @@ def import_table(
         Table, or folder of files, depending on the form.
     folder : path
         Folder of the new experiment.
-    columns : mapping of str to str, optional
-        Names of columns by role: frame, id, x, y, theta, radius or diameter, time.
+    columns : mapping of str to str or int, optional
+        Names of columns, or their numbers from 1, by role: frame, id, x, y, theta, radius or diameter, time.
     **options
         - form : 'table' (default), 'trackpy', 'trackmate', 'rodtracker', 'lammps', 'yade', 'mercury', 'pegs', 'dic'.
         - pixel_size : float, the files' unit of length [m]; default: metres.
@@ -90,8 +92,9 @@ def import_table(
         - radius : float, of all grains without one, in the files' unit.
         - interval : float, time between photographs, or of a step [s].
         - precision : float, standard deviation of a position, in the files' unit.
-        - walls : 'box', 'outer', 'none', or a table frame,wall,x1,y1,x2,y2.
-        - pressure : mapping of str to float, on walls [Pa].
+        - walls : 'box', 'outer', 'none', or a table frame,wall,x1,y1,x2,y2: a data frame, or its file.
+        - pressure : mapping of str to float, on walls [Pa]; load : the same in newtons.
+        - corner_radius : float, of the corner discs of a frame, in the files' unit.
         - pairs : path, pair forces of a simulation [N] as truth.
 
     Returns
@@ -124,12 +127,16 @@ def import_table(
     others: dict[str, Any] = {name: each for name, each in options.items() if name != "form"}
     if "pairs" in others:
         others["pairs"] = Path(others["pairs"])
+    for name in ("pressure", "load"):
+        others[name] = _numbers_by_wall(name, others.get(name, {}))
+    roles = as_mapping("columns", columns or {}, 'roles to columns, such as {"x": "X", "y": "Y"}')
+    roles = {role: str(each) for role, each in roles.items()}
     with tempfile.TemporaryDirectory(prefix="rodsight-") as place:
-        file = Path(place) / DATA_FRAME if isinstance(source, pd.DataFrame) else Path(source)
-        if isinstance(source, pd.DataFrame):
-            source.to_csv(file, index=False)
-        with naming(Path(place) / DATA_FRAME, DATA_FRAME):
-            imported, _ = import_files(ImportRequest(form, file, columns or {}, **others), Path(folder))
+        file = _as_file("source", source, Path(place) / DATA_FRAME)
+        if "walls" in others:
+            others["walls"] = str(_as_file("walls", others["walls"], Path(place) / WALL_FRAME))
+        with naming(Path(place) / DATA_FRAME, DATA_FRAME), naming(Path(place) / WALL_FRAME, WALL_FRAME):
+            imported, _ = import_files(ImportRequest(form, file, roles, **others), Path(folder))
     tracks = imported.tracks
     frame, grain = tracks.present.nonzero()
     table = pd.DataFrame(
@@ -142,6 +149,24 @@ def import_table(
     table.attrs["units"] = {"x": "m", "y": "m", "theta": "rad", "radius": "m"}
     table.attrs["remarks"] = list(imported.remarks)
     return table
+
+
+def _as_file(name: str, value: object, file: Path) -> Path:
+    """Return the path that is given, or write a data frame to a file. Raises InputError for what is neither."""
+    if isinstance(value, pd.DataFrame):
+        value.to_csv(file, index=False)
+        return file
+    if not isinstance(value, str | PathLike):
+        raise InputError("import_table", f"{name} = {type(value).__name__}", "is neither a path nor a data frame")
+    return Path(value)
+
+
+def _numbers_by_wall(name: str, value: object) -> dict[str, float]:
+    given = as_mapping(f"import_table: {name}", value, 'walls to numbers, such as {"top": 50e3}')
+    for wall, number in given.items():
+        if not is_number(number):
+            raise InputError("import_table", f"{name} = {{{wall!r}: {number!r}}}", "is not a number")
+    return {str(wall): float(number) for wall, number in given.items()}
 
 
 @arguments_named()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
@@ -23,7 +24,7 @@ from ..experiment.experiment import (
     arrange_cell,
     arrange_tracks,
 )
-from ..experiment.plausibility import PackingSources, check_inside, check_radii
+from ..experiment.plausibility import PackingSources, check_inside, check_radii, implausible_loads
 from ..experiment.walls import ARC_COLUMNS, LOAD_COLUMNS, WALL_COLUMNS, arrange_arcs, arrange_loads, arrange_walls
 from ..inference.infer_sequence import infer_sequence
 from ..inference.inference_settings import material_of, settings_of
@@ -116,6 +117,8 @@ def solve(
     sources = PackingSources(("tracks", "column radius"), ("precision", f"{precision:g}"), WALL_ARGUMENTS)
     check_inside(sources, tracked, wall_tracks)
     check_radii(sources, tracked)
+    for sentence in implausible_loads(sections.material, tracked, wall_tracks):
+        warnings.warn(sentence, stacklevel=2)
     inputs = Inputs(tracked, wall_tracks, material_of(sections), settings_of(sections))
     shown, kernels = progress or shown_progress(), KernelsAhead()
     try:
@@ -139,8 +142,8 @@ def _arrange_tracks(tracks: pd.DataFrame, precision: float) -> Tracks:
         _check_constant(tracks, "frame", "time")
         times = tracks.drop_duplicates("frame")
     else:
-        frames = sorted(tracks["frame"].unique())
-        times = pd.DataFrame({"frame": frames, "time": np.asarray(frames, np.float64)})
+        frames = np.unique(poses.integers("frame"))
+        times = pd.DataFrame({"frame": frames, "time": frames.astype(np.float64)})
     return arrange_tracks(
         as_table("tracks", grains, GRAIN_COLUMNS), poses, as_table("tracks", times, TIME_COLUMNS), precision
     )
@@ -189,13 +192,15 @@ def _arrange_walls(
         circles, ends, arc_side = arrange_arcs(as_table("arcs", table, columns), frame_count, others=names)
         side = np.concatenate([np.full(len(names), STRAIGHT, np.int8), arc_side])
         names, endpoints = names + circles, np.concatenate([endpoints, ends], axis=1)
-    for name, value in as_mapping("pressure", pressure, 'walls to pascals, such as {"top": 50e3}').items():
+    given = as_mapping("pressure", pressure, 'walls to pascals, such as {"top": 50e3}')
+    given = {str(name): value for name, value in given.items()}  # names of a table are texts
+    for name, value in given.items():
         if name not in names:
             raise InputError("pressure", repr(name), f"is not the name of a wall: there are {', '.join(names)}")
         if not (is_number(value) and PRESSURES[0] <= value <= PRESSURES[1]):
             limits = "{:g} to {:g}".format(*PRESSURES)
             raise InputError("pressure", f"{name} = {value!r}", f"is not a number of pascals from {limits}")
-    pressed = np.array([pressure.get(name, np.nan) for name in names], np.float64)
+    pressed = np.array([given.get(name, np.nan) for name in names], np.float64)
     measured = None
     if load is not None:
         measured = arrange_loads(as_table("load", as_frame("load", load), LOAD_COLUMNS), names, frame_count, pressed)

@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import pipeline
 from ..exchange.grain_quantities import rod_length
+from ..experiment.plausibility import PackingSources, check_inside
 from ..inference.infer_sequence import infer_sequence
 from ..inference.inputs import Inputs
 from ..inference.solve_frames import InferenceObserver
@@ -17,8 +18,9 @@ from ..process.errors import InputError
 from ..results.hdf5.lazy_sequences import LazySequence
 from ..results.results import Results
 from ..reviewing.judging.candidate_pairs import walls_at
+from ..solver.bodies.wall_shapes import IN, OUT, STRAIGHT
 from ..solver.contacts.contacts import Contacts, measure_contacts
-from ..solver.contacts.pairs import find_rows
+from ..solver.contacts.pairs import find_rows, split_key, split_keys
 from ..solver.contacts.verdicts import Verdicts
 from ..solver.frame_forces import FrameForces, FrameStatus
 from ..solver.redistribution.contact_removal import remove_contact
@@ -75,8 +77,9 @@ def what_if(
     Raises
     ------
     InputError
-        There is no such frame (an IndexError as well), a body is unknown, a forbidden contact does not exist or
-        contacts are forced (local), or the input of the run changed on the disk.
+        There is no such frame (an IndexError as well), a body is unknown, forced bodies are farther apart than a
+        radius, a grain is moved beyond a wall, a forbidden contact does not exist or contacts are forced (local), or
+        the input of the run changed on the disk.
 
     Examples
     --------
@@ -93,6 +96,7 @@ def what_if(
         raise InputError("what_if", f"friction = {friction!r}", "is not a coefficient of friction")
     frames = range(stored.tracks.frame_count) if frame is None else (run.checked_frame(frame),)
     forbidden, forced = _keys(stored, forbid, "forbid"), _keys(stored, force, "force")
+    _check_pairs(stored, frames, forbidden, forced)
     if local:
         if len(forced):
             raise InputError(
@@ -130,6 +134,28 @@ def _keys(results: Results, pairs: Pairs, name: str) -> np.ndarray:
     return np.array(sorted(found), np.int64)
 
 
+def _check_pairs(results: Results, frames: Sequence[int], forbidden: np.ndarray, forced: np.ndarray) -> None:
+    """Raise InputError where a pair is both forbidden and forced, or where forced bodies are farther than a radius."""
+    bodies = BodyNames.of(results.tracks, results.walls)
+    both = np.intersect1d(forbidden, forced)
+    if len(both):
+        raise InputError("what_if", f"force = {_names(bodies, int(both[0]))}", "is forbidden as well")
+    i, j = split_keys(forced, bodies.count)
+    for k in frames if len(forced) else ():
+        gap = measure_contacts(results.grains, results.tracks.position[k], walls_at(results, k), i, j).gap
+        far = np.flatnonzero(gap > results.tracks.radius[i])
+        if len(far):
+            apart = 1e3 * float(gap[far[0]])
+            raise InputError(
+                "what_if", f"force = {_names(bodies, int(forced[far[0]]))}", f"are {apart:.3g} mm apart in frame {k}"
+            )
+
+
+def _names(bodies: BodyNames, key: int) -> tuple[Any, Any]:
+    i, j = split_key(key, bodies.count)
+    return bodies.name(i), bodies.name(j)
+
+
 def _as_pairs(pairs: Pairs, name: str) -> Iterator[tuple[Any, Any]]:
     """Yield both bodies of every pair. Raises InputError for what is no pair."""
     if not isinstance(pairs, Iterable) or isinstance(pairs, str):
@@ -158,10 +184,22 @@ def _with_verdicts(inputs: Inputs, frames: Iterable[int], forbidden: np.ndarray,
 def _moved(inputs: Inputs, frames: Iterable[int], move: Mapping[int, tuple[float, float]]) -> Inputs:
     if not move:
         return inputs
-    position = inputs.tracks.position.copy()
-    for row, step in _steps(inputs.tracks, move).items():
-        position[list(frames), row] += step
-    return replace(inputs, tracks=replace(inputs.tracks, position=position))
+    tracks, at = inputs.tracks, list(frames)
+    position, placed = tracks.position.copy(), np.zeros(tracks.present.shape, np.bool_)
+    for row, step in _steps(tracks, move).items():
+        position[at, row] += step
+        placed[at, row] = True
+    if inputs.placed is not None:
+        placed |= inputs.placed
+    moved = replace(inputs, tracks=replace(tracks, position=position), placed=placed)
+    _check_walls(moved)
+    return moved
+
+
+def _check_walls(inputs: Inputs) -> None:
+    """Raise InputError where a grain was moved beyond a wall."""
+    named: dict[int, str] = dict.fromkeys((STRAIGHT, IN, OUT), "what_if: move")
+    check_inside(PackingSources(("what_if: move", ""), None, named), inputs.tracks, inputs.walls)
 
 
 def _steps(tracks: Tracks, move: Mapping[int, tuple[float, float]]) -> dict[int, np.ndarray]:

@@ -59,10 +59,15 @@ def read_truth(
     Raises
     ------
     InputError
-        A grain or wall is unknown.
+        A grain or wall is unknown, or frames count from one.
     """
     table = file if isinstance(file, Table) else read_table(file, TRUTH_COLUMNS, inputs)
     number, i = table.integers("frame") - frames.start, table.integers("i")
+    if frames == ALL_FRAMES and len(number) and number.min() > 0 and number.max() >= frame_count:
+        raise table.error(
+            int(number.argmax()), "frame", f"is no photograph: frames count from 0 to {frame_count - 1}, and these "
+            f"from {number.min()}",
+        )  # fmt: skip
     frame = np.where(number % frames.step == 0, number // frames.step, -1)
     wall = {name: ids.shape[-1] + row for row, name in enumerate(walls or ())}
     at_wall = np.zeros(len(table), np.bool_)  # of an experiment without walls

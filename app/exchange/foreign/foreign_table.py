@@ -14,6 +14,8 @@ from ...process.errors import InputError, MissingFileError
 
 PARQUET = b"PAR1"
 COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+")
+SEPARATOR = re.compile(r"sep=(.)", re.IGNORECASE)  # the first line of tables that Excel writes
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf)", re.IGNORECASE)
 MISSING = frozenset({"", "nan", "NaN", "NA", "null", "None", "-"})  # cells without a value
 MAX_LISTED = 12  # column names in a message
@@ -130,9 +132,11 @@ def _open_text(file: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
     kept = [(number, text) for number, text in enumerate(lines, start=1) if text.strip()]
     remarks = [text.lstrip("#% \t") for _, text in kept if text.lstrip().startswith(("#", "%"))]
     kept = [(number, text) for number, text in kept if not text.lstrip().startswith(("#", "%"))]
+    stated = SEPARATOR.fullmatch(kept[0][1].strip()) if kept else None
+    kept = kept[1:] if stated else kept
     if not kept:
         raise InputError(file, "", "is empty")
-    delimiter = _delimiter(kept[0][1])
+    delimiter = stated[1] if stated else _delimiter(kept[0][1])
     cells = [(number, _split(text, delimiter)) for number, text in kept]
     first = [cell.strip() for cell in cells[0][1]]
     if not all(NUMBER.fullmatch(cell) or cell in MISSING for cell in first):
@@ -164,7 +168,7 @@ def _split(line: str, delimiter: str | None) -> list[str]:
 
 
 def _convert_decimal_commas(table: Table, name: str, values: dict[str, list[str]]) -> None:
-    """Decimal commas become points; a column that has both is not guessed at."""
+    """Decimal commas become points; a column that may have points, or separators of thousands, is not guessed at."""
     commas = [row for row, cell in enumerate(values[name]) if COMMA_DECIMAL.fullmatch(cell)]
     if not commas:
         return
@@ -172,4 +176,9 @@ def _convert_decimal_commas(table: Table, name: str, values: dict[str, list[str]
         raise table.error(
             commas[0], name, "has a comma where other rows have a point: the decimal separator is ambiguous"
         )
+    if len(commas) < sum(map(bool, values[name])) and all(THOUSANDS.fullmatch(values[name][row]) for row in commas):
+        raise table.error(
+            commas[0], name, "has a comma before three digits, and other rows have none: decimals, or thousands? Write "
+            "numbers without separators of thousands",
+        )  # fmt: skip
     values[name][:] = [cell.replace(",", ".") if COMMA_DECIMAL.fullmatch(cell) else cell for cell in values[name]]

@@ -49,11 +49,16 @@ class ImportRequest:
     def __post_init__(self) -> None:
         if self.form not in get_args(FileFormat):
             raise InputError("import", repr(self.form), f"is not a form: there are {', '.join(get_args(FileFormat))}")
+        for name in ("y_down", "degrees"):
+            if not isinstance(getattr(self, name), bool | np.bool_):
+                raise InputError(f"--{name.replace('_', '-')}", repr(getattr(self, name)), "is neither true nor false")
         for name in ("pixel_size", "interval", "precision", "height", "radius", "corner_radius"):
             value = getattr(self, name)
-            if value is not None and not (
-                isinstance(value, int | float | np.number) and math.isfinite(value) and value > 0.0
-            ):
+            if value is None:
+                continue
+            if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+                raise InputError(f"--{name.replace('_', '-')}", repr(value), "is not a number")
+            if not (math.isfinite(value) and value > 0.0):
                 raise InputError(f"--{name.replace('_', '-')}", str(value), "is not positive")
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...experiment.reading.tables import check_unique
 from ...experiment.walls import WALL_COLUMNS
 from ...process.errors import InputError
 from ...solver.bodies.grains import Array
@@ -16,6 +17,7 @@ from .observations import Convention, ImportedTracks
 from .simulations.lammps_dump import DumpData
 
 SIDES = ("bottom", "right", "top", "left")
+SIZES = (0.05, 50.0)  # of all walls together over that of the packing
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +76,7 @@ def read_foreign_walls(file: Path, imported: ImportedTracks, convention: Convent
     if convention.y_down:
         ends[..., 1] = imported.floor - ends[..., 1]
     ends *= convention.unit
+    check_unique(table, "wall", number, np.unique(text, return_inverse=True)[1])
     numbers = imported.number if len(set(number.tolist())) > 1 else number[:1]
     endpoints = np.full((len(numbers), len(names), 2, 2), np.nan)
     for row, (k, name) in enumerate(zip(number, text, strict=True)):
@@ -83,9 +86,23 @@ def read_foreign_walls(file: Path, imported: ImportedTracks, convention: Convent
     absent = np.argwhere(np.isnan(endpoints[:, :, 0, 0]))
     if len(absent):
         raise InputError(file, f"frame {numbers[absent[0][0]]}", f"has no row of wall {names[absent[0][1]]!r}")
+    _check_size(file, endpoints, imported.tracks, convention)
     endpoints = np.broadcast_to(endpoints, (len(imported.number), *endpoints.shape[1:])).copy()
     centre = np.nanmean(imported.tracks.position, axis=1)[:, None]
     along, inward = endpoints[:, :, 1] - endpoints[:, :, 0], centre - endpoints[:, :, 0]
     right = along[..., 0] * inward[..., 1] - along[..., 1] * inward[..., 0] < 0.0
     endpoints[right] = endpoints[right][:, ::-1]
     return Walls(names, endpoints, f"From {file.name}.")
+
+
+def _check_size(file: Path, endpoints: Array, tracks: Tracks, convention: Convention) -> None:
+    """Raise InputError where walls (f, w, 2, 2) [m] are much smaller or larger than the packing: another unit."""
+    places = endpoints[0].reshape(-1, 2), tracks.position[0, tracks.present[0]]
+    walls, packing = (float(np.hypot(*np.ptp(each, axis=0))) for each in places)
+    if SIZES[0] * packing <= walls <= SIZES[1] * packing:
+        return
+    in_metres = SIZES[0] * packing <= walls / convention.unit <= SIZES[1] * packing
+    raise InputError(
+        file, "", f"makes the walls {walls:.3g} m wide, and the grains are {packing:.3g} m apart: give walls in the "
+        "unit of the grains" + (", not in metres" if in_metres else ""),
+    )  # fmt: skip

@@ -36,7 +36,14 @@ def parse_columns(text: str | None) -> dict[str, str]:
 
 
 def read_by_columns(file: Path, columns: Mapping[str, str], *, degrees: bool) -> Observations:
-    """Read a table whose columns are named by role. Raises InputError for a role without a column."""
+    """Read a table whose columns are named by role; by default a role is the column of its own name.
+
+    Raises InputError for a role without a column.
+    """
+    own = {role: role for role in (*NEEDED, *OPTIONAL) if role in column_names(file)}
+    columns = own | dict(columns)
+    if "radius" in own and "diameter" in columns:
+        del columns["radius" if "diameter" not in own else "diameter"]
     missing = [role for role in NEEDED if role not in columns]
     if missing:
         names = ", ".join(column_names(file)[:12])

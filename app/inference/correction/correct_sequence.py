@@ -56,7 +56,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     given, id_remark = restore_exchanged_ids(inputs.tracks)
     walls, failed = complete_walls(given, walls)
     given, size_remark = (given, "") if settings.calibration is None else correct_exchanged_sizes(given, walls)
-    tracks, outlier_remark = remove_outliers(given, walls)
+    tracks, outlier_remark = remove_outliers(given, walls, inputs.placed)
     tracks, gap_remark = interpolate_short_gaps(tracks, walls)
     nothing_seen = len(failed) == tracks.frame_count
     if nothing_seen:

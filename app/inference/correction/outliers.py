@@ -30,7 +30,9 @@ MOST = 0.1  # of the poses of a frame: where more jump, the packing rearranges
 NAMED, LISTED = 6, 4  # rods of one photograph, and photographs, that a sentence lists
 
 
-def remove_outliers(tracks: Tracks, walls: WallTracks | None = None) -> tuple[Tracks, str]:
+def remove_outliers(
+    tracks: Tracks, walls: WallTracks | None = None, placed: NDArray[np.bool_] | None = None
+) -> tuple[Tracks, str]:
     """Take poses of rods that jump for one photograph out of it; they are lost there.
 
     Parameters
@@ -38,6 +40,8 @@ def remove_outliers(tracks: Tracks, walls: WallTracks | None = None) -> tuple[Tr
     tracks : Tracks
     walls : WallTracks, optional
         Rods cannot be beyond them.
+    placed : bool array (f, n), optional
+        Poses that stay where they are.
 
     Returns
     -------
@@ -47,6 +51,8 @@ def remove_outliers(tracks: Tracks, walls: WallTracks | None = None) -> tuple[Tr
         How many there were; empty where there is none.
     """
     outlier = find_outliers(tracks, walls)
+    if placed is not None:
+        outlier &= ~placed
     count = int(outlier.sum())
     if not count:
         return tracks, ""

@@ -318,7 +318,7 @@ def _validate_walls(found: ValidationResult, experiment: Experiment) -> None:
         return
     for name, count in rods_cut_by_walls(tracks, first).items():
         step.add_error(f"Wall {name!r} cuts through {state_count(count, 'rod')}: move it to their rims.")
-    for sentence in (*rods_beyond_ends(tracks, first), *implausible_loads(experiment, tracks, first)):
+    for sentence in (*rods_beyond_ends(tracks, first), *implausible_loads(config.material, tracks, first)):
         step.add_warning(sentence)
 
 
