@@ -96,7 +96,6 @@ def what_if(
         raise InputError("what_if", f"friction = {friction!r}", "is not a coefficient of friction")
     frames = range(stored.tracks.frame_count) if frame is None else (run.checked_frame(frame),)
     forbidden, forced = _keys(stored, forbid, "forbid"), _keys(stored, force, "force")
-    _check_pairs(stored, frames, forbidden, forced)
     if local:
         if len(forced):
             raise InputError(
@@ -104,6 +103,7 @@ def what_if(
                 "solve the sequence again, without local",
             )  # fmt: skip
         return Run(_changed_locally(stored, frames, forbidden, _steps(stored.tracks, move or {}), friction))
+    _check_pairs(stored, frames, forbidden, forced)
     inputs = run.inputs if run.inputs is not None else _stored_inputs(run)
     inputs = _with_verdicts(inputs, frames, forbidden, forced)
     inputs = _moved(inputs, frames, move or {})

@@ -28,7 +28,7 @@ FWHM_OF_LENGTH = 2.0 * np.sqrt(2.0 * np.log(2.0))
 MIN_SPECKLE = 2.5  # [px] least speckle that a camera samples
 MAX_SPECKLE_RATIO = 0.5  # greatest speckle / radius: a rod shows few larger ones
 MAX_CLIPPED = 0.01  # greatest fraction of saturated pixels
-MIN_CONTRAST = 8.0  # [grey] least contrast of a pattern that can be tracked
+MIN_CONTRAST = 8.0  # [grey] least contrast of a pattern that can be tracked, in light of half the range
 MAX_SIGMA = 0.03  # [px]: at a usual step rods slide by a tenth of a pixel
 MAX_DRIFT = 0.25  # greatest relative change of the light
 MIN_CONTRAST_RATIO = 0.4  # least contrast / that of the first photograph
@@ -67,7 +67,9 @@ class PictureQuality:
 
     def _faults_of_pattern(self) -> list[str]:
         faults = []
-        if not np.isfinite(self.sigma) or self.contrast[0] < MIN_CONTRAST:
+        # Cameras of 10 or 12 bits leave most of the range of 16 bits empty.
+        least = MIN_CONTRAST * min(1.0, self.light[0] / (0.5 * FULL_SCALE))
+        if not np.isfinite(self.sigma) or self.contrast[0] < least:
             faults.append(
                 "The rods show hardly any pattern: paint the ends, or track plain discs by their rims "
                 '(follow = "outline").'
@@ -94,8 +96,8 @@ class PictureQuality:
         worst = int(self.clipped.argmax())
         if self.clipped[worst] > MAX_CLIPPED:
             faults.append(
-                f"{self.clipped[worst]:.0%} of the pixels of photograph {self.frame[worst]} are saturated: change the "
-                "exposure."
+                f"{self.clipped[worst]:.0%} of the pixels of photograph {self.frame[worst]} are black or saturated: "
+                "change the exposure."
             )
         contrast_ratio = self.contrast / max(self.contrast[0], 1e-9)
         if contrast_ratio.min() < MIN_CONTRAST_RATIO:

@@ -8,6 +8,7 @@ import struct
 FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 STANDALONE = frozenset((0x01, *range(0xD0, 0xD9)))  # markers without a length
 WIDTH, HEIGHT = 256, 257  # tags of a TIFF
+MOST_PAGES = 100_000  # of a TIFF that are counted
 SHORT = 3  # a TIFF's type of 16 bits
 
 
@@ -41,9 +42,29 @@ def _size_of_jpeg(content: bytes) -> tuple[int, int] | None:
     return None
 
 
+def pages_alike(content: bytes) -> int:
+    """Return the number of pages of a TIFF that are as large as the first; 1 for other files."""
+    if content[:4] not in (b"II*\0", b"MM\0*"):
+        return 1
+    order, sizes = "<" if content.startswith(b"II") else ">", []
+    try:
+        (at,) = struct.unpack(order + "I", content[4:8])
+        while at and len(sizes) < MOST_PAGES:
+            sizes.append(_size_of_page(content, order, at))
+            (count,) = struct.unpack(order + "H", content[at : at + 2])
+            (at,) = struct.unpack(order + "I", content[at + 2 + 12 * count : at + 6 + 12 * count])
+    except struct.error:  # truncated: the decoder reports it
+        pass
+    return max(sizes.count(sizes[0]), 1) if sizes else 1
+
+
 def _size_of_tiff(content: bytes) -> tuple[int, int] | None:
     order = "<" if content.startswith(b"II") else ">"
     (at,) = struct.unpack(order + "I", content[4:8])
+    return _size_of_page(content, order, at)
+
+
+def _size_of_page(content: bytes, order: str, at: int) -> tuple[int, int] | None:
     (count,) = struct.unpack(order + "H", content[at : at + 2])
     found: dict[int, int] = {}
     for entry in range(at + 2, at + 2 + 12 * count, 12):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...process.errors import InputError
 from ..reading.input_files import InputFiles
 from .image import CHANNELS, FULL_SCALE, Channel, Image, ImageSelection, Rotation, rotated
-from .image_header import claimed_size
+from .image_header import claimed_size, pages_alike
 
 MAX_PIXELS = 200_000_000  # more than any laboratory camera has; .8 GB as float32
 
@@ -82,6 +82,7 @@ def content_of(file: Path, inputs: InputFiles | None, max_pixels: int) -> bytes:
     if file.suffix.lower() not in RAW_SUFFIXES:
         _refuse_truncated(file, content)
         _refuse_huge(file, content, max_pixels)
+        _refuse_stack(file, content)
     return content
 
 
@@ -176,6 +177,13 @@ def _refuse_truncated(file: Path, content: bytes) -> None:
     )
     if cut:
         raise InputError(file, f"{len(content)} bytes", "the file is cut short")
+
+
+def _refuse_stack(file: Path, content: bytes) -> None:
+    """Raise InputError for a file of several pictures, of which only the first would be used."""
+    pages = pages_alike(content)
+    if pages > 1:
+        raise InputError(file, "", f"holds {pages} pictures: save each as its own file (ImageJ: Image Sequence)")
 
 
 def _refuse_huge(file: Path, content: bytes, most: int) -> None:

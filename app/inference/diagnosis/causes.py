@@ -75,7 +75,7 @@ CAUSES: dict[str, Cause] = {
     ),
     "missing_poses": Cause(
         "contacts of rods that photographs lack are interpolated, or missing",
-        "find these rods in the photographs",
+        "find these rods in the photographs, or leave out the photographs that lack most of them",
         corrected=True,
     ),
     "wall_misplaced": Cause(

@@ -46,6 +46,7 @@ IN_BOTH = 0.1  # fraction of the rods that two photographs must show to be compa
 BEYOND = 0.1  # mean radius by which rods may stand beyond a wall
 USUAL, BEYOND_USUAL = 0.99, 1.5  # quantile of all overlaps, and times it that an outlier overlaps another body
 MISSING = 0.03  # fraction of the poses that may be missing
+MOSTLY_MISSING = 0.5  # fraction of the rods that a photograph shows, below which it is named
 INERTIAL, OUT = 5e-3, 7.0  # inertial number that is reported; force out of balance over the mean force, for I = 1
 ROTATING_POSES, FEWEST_STEPS = 6000, 4  # poses, and steps between photographs, whose rotations are compared
 SEVERAL = 6  # rods that stand beyond a wall at least: with fewer, their radii may be wrong
@@ -243,7 +244,10 @@ def examine_poses(tracks: Tracks, impossible: NDArray[np.bool_]) -> list[Finding
     seen = tracks.present.any(axis=0)
     missing = 1.0 - float(tracks.present[:, seen].mean()) if seen.any() else 0.0
     if MISSING < missing < 1.0:
-        found.append(finding("missing_poses", f"{100.0 * missing:.0f} % of the poses are missing"))
+        empty = np.flatnonzero(tracks.present[:, seen].mean(axis=1) < MOSTLY_MISSING)
+        photographs = ("photograph " if len(empty) == 1 else "photographs ") + ", ".join(map(str, empty[:NAMED]))
+        where = f", most of those in {photographs}" if len(empty) else ""
+        found.append(finding("missing_poses", f"{100.0 * missing:.0f} % of the poses are missing{where}"))
     return found
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from rodsight.experiment.pictures.image_header import claimed_size
+from rodsight.experiment.pictures.image_header import claimed_size, pages_alike
 from rodsight.experiment.pictures.picture_file import read_photograph
 from rodsight.process.errors import InputError
 
@@ -131,6 +131,17 @@ def test_the_size_is_read_from_the_header(tmp_path, suffix):
     cv2.imwrite(str(file), np.zeros((30, 70), np.uint8))
     assert claimed_size(file.read_bytes()) == (70, 30)
     assert claimed_size(file.read_bytes()[:10]) is None
+
+
+def test_a_file_of_several_pictures_is_refused(tmp_path):
+    page, small = np.full((30, 70), 9, np.uint8), np.full((3, 7), 9, np.uint8)
+    for name, pages in (("stack.tif", [page] * 3), ("one.tif", [page]), ("with_preview.tif", [page, small])):
+        assert cv2.imwritemulti(str(tmp_path / name), pages)
+    with pytest.raises(InputError, match="holds 3 pictures: save each as its own file"):
+        read_photograph(tmp_path / "stack.tif")
+    assert read_photograph(tmp_path / "one.tif").shape == (30, 70)
+    assert read_photograph(tmp_path / "with_preview.tif").shape == (30, 70)
+    assert pages_alike((tmp_path / "stack.tif").read_bytes()[:60]) == 1
 
 
 def test_a_small_file_that_states_a_huge_size_is_refused_undecoded(tmp_path, monkeypatch):

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 import rodsight
@@ -20,7 +21,7 @@ def test_a_wrong_data_frame_is_called_a_data_frame(tmp_path):
     with pytest.raises(rodsight.InputError, match=r"^data frame: row 3, X = 'wide': is not a number$"):
         rodsight.import_table(spots, tmp_path / "out", roles | {"x": "X"}, radius=0.01)
     for option in ({"form": "tables"}, {"pixel_size": "wide"}):
-        with pytest.raises(rodsight.InputError, match=r"is not a form: there are table, |wide: is not positive$"):
+        with pytest.raises(rodsight.InputError, match=r"is not a form: there are table, |'wide': is not a number$"):
             rodsight.import_table(spots, tmp_path / "out", roles, **option)  # type: ignore[arg-type]
     spots["X"] = [0.1, 0.12]
     rodsight.import_table(spots, tmp_path / "out", roles | {"x": "X"}, radius=0.01)
@@ -67,6 +68,47 @@ def test_a_run_without_a_recording_is_a_missing_file(run, tmp_path):
     with pytest.raises(rodsight.InputError, match=r"^there is no recording of this run: ") as raised:
         rodsight.Run(tmp_path / "results.h5").view()
     assert isinstance(raised.value, FileNotFoundError)
+
+
+SPOTS = pd.DataFrame({"frame": [0, 0], "id": [1, 2], "x": [0.1, 0.12], "y": [0.1, 0.1], "radius": [0.01, 0.01]})
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"pressure": 5e4}, "^import_table: pressure: 50000.0: is no mapping of walls"),
+        ({"pressure": {"top": "50e3"}}, "is not a number$"),
+        ({"columns": "frame=t"}, "^columns: 'frame=t': is no mapping of roles"),
+        ({"source": [1]}, "^import_table: source = list: is neither a path nor a data frame$"),
+        ({"walls": 3}, "^import_table: walls = int: is neither a path nor a data frame$"),
+        ({"y_down": "no"}, "^y_down: 'no': is neither true nor false$"),
+        ({"pixel_size": True}, "^pixel_size: True: is not a number$"),
+    ],
+)
+def test_wrong_arguments_of_an_import_are_named(tmp_path, options, words):
+    with pytest.raises(rodsight.InputError, match=words):
+        rodsight.import_table(**{"source": SPOTS, "folder": tmp_path / "out", "walls": "box", **options})
+
+
+def test_a_column_with_the_name_of_its_role_need_not_be_named(tmp_path):
+    walls = pd.DataFrame({"frame": [0], "wall": ["floor"], "x1": [0.0], "y1": [0.09], "x2": [0.2], "y2": [0.09]})
+    table = rodsight.import_table(SPOTS, tmp_path / "out", walls=walls, pressure={"floor": np.float64(5e4)})
+    assert table["radius"].tolist() == [0.01, 0.01]
+    assert "pressure = 50000.0" in (tmp_path / "out" / "experiment.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda table: table.assign(frame="one"), "^tracks: row 0, frame = 'one': is not a whole number$"),
+        (lambda table: table.assign(frame=[0.0, 0.5]), "^tracks: row 1, frame = '0.5': is not a whole number$"),
+        (lambda table: pd.concat([table, table[["id"]]], axis=1), "^tracks: column id: stands twice$"),
+        (lambda table: table.to_xarray(), "^tracks: is no table: "),
+    ],
+)
+def test_wrong_columns_of_tracks_are_named(change, words):
+    with pytest.raises(rodsight.InputError, match=words):
+        rodsight.solve(change(SPOTS), boundary="outer")
 
 
 @pytest.mark.parametrize(

@@ -170,11 +170,19 @@ def test_moved_grains_and_another_friction_change_the_inputs(run):
     assert rodsight.what_if(run, friction=0.4).results.friction == 0.4
 
 
+def test_a_grain_that_is_moved_far_is_no_outlier(run):
+    moved = rodsight.what_if(run, 2, move={7: (0.0, 4e-4)})
+    assert moved.grains(2)["y"][7] - run.grains(2)["y"][7] == pytest.approx(4e-4, abs=5e-5)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         ({"forbid": [(1, "lid")]}, "'lid' is neither a grain's id nor a wall's name"),
         ({"force": [(1, 1)]}, "is one body"),
+        ({"force": [(0, 39)]}, r"force = \(0, 39\): are 115 mm apart in frame 0"),
+        ({"force": [(0, 1)], "forbid": [(1, 0)]}, r"force = \(0, 1\): is forbidden as well"),
+        ({"move": {7: (1.0, 0.0)}}, r"^what_if: move: frame 0, wall 'right': grain 7 lies "),
         ({"move": {999: (0.0, 0.0)}}, "is not the id of a grain"),
         ({"friction": -1.0}, "is not a coefficient of friction"),
         ({"local": True, "force": [(0, 39)]}, "does not apply to force"),

@@ -59,6 +59,16 @@ def test_contacts_of_unseen_rods_are_ignored_and_unknown_ids_refused(poses: Path
         read_truth(truth, names, ("top",), frame_count=1, unseen=true_ids(poses))
 
 
+def test_frames_that_count_from_one_are_refused(tmp_path: Path) -> None:
+    truth = tmp_path / "truth_contacts.csv"
+    truth.write_text("frame,i,j,fn,ft\n1,10,11,5,1\n2,10,11,7,2\n")
+    names = np.array([10, 11])
+    with pytest.raises(InputError, match=r"row 3, frame = '2': is no photograph: .* 0 to 1, and these from 1"):
+        read_truth(truth, names, ("top",), frame_count=2)
+    assert read_truth(truth, names, ("top",), frame_count=3).frame.tolist() == [1, 2]
+    assert read_truth(truth, names, ("top",), frame_count=2, frames=FrameRange(0, 2)).frame.tolist() == [1]
+
+
 def test_names_that_a_tracker_confused_are_those_of_the_table_in_every_frame(tmp_path: Path) -> None:
     """Forces that another program lists under the names of its tracks belong to the grains that bear them."""
     truth = tmp_path / "truth_contacts.csv"

@@ -72,12 +72,17 @@ def _detection(centre: np.ndarray, radius: np.ndarray):
         (lambda p, k: p * (1.0 - 0.1 * k), "light changes by -40% until photograph 4"),
         (lambda p, k: p if k != 2 else 12.0 + 0.02 * p, "Photograph 2 has"),
         (lambda p, k: p if k != 3 else cv2.GaussianBlur(p, (0, 0), 2.5), "Photograph 3 is blurred"),
-        (lambda p, k: p + 110.0, "are saturated"),
+        (lambda p, k: p + 110.0, "are black or saturated"),
         (lambda p, _: 120.0 + 0.1 * (p - 120.0), "hardly any pattern"),
     ],
 )
 def test_each_fault_is_named(change, words):
     assert words in faults_of(measure_pictures(photograph_series(change)))
+
+
+def test_a_camera_of_twelve_bits_has_a_pattern():
+    """Its photographs fill a sixteenth of the range of 16 bits."""
+    assert "pattern" not in faults_of(measure_pictures(photograph_series(lambda p, _: p / 16.0)))
 
 
 def test_discs_tracked_by_their_rims_need_no_pattern():

@@ -57,6 +57,36 @@ def test_every_separator_and_decimal_mark_is_read(tmp_path, capsys, separator, s
     assert "add [walls]" in printed
 
 
+def test_the_separator_that_excel_states_is_used(tmp_path, capsys):
+    file = write(tmp_path / "any.txt", ";", start="sep=;\n", decimal=",")
+    import_files(
+        capsys, "table", file, tmp_path / "out", "--columns", COLUMNS, "--pixel-size", PIXEL, "--y-down", "--degrees",
+        "--interval", 30,
+    )  # fmt: skip
+    expect_rows(tmp_path / "out")
+
+
+def test_separators_of_thousands_are_not_taken_for_decimals(tmp_path, capsys):
+    rows = '0,1,270,"1,131",0,4\n0,2,278,"1,131",0,4\n1,1,270,999,0,4\n1,2,278,999,0,4\n'
+    (tmp_path / "a.csv").write_text("t,rod,X,Y,turn,R\n" + rows)
+    line = refuse(capsys, "table", tmp_path / "a.csv", tmp_path / "out", "--columns", COLUMNS, "--pixel-size", PIXEL)
+    assert "row 2, Y = '1,131': has a comma before three digits, and other rows have none" in line
+
+
+@pytest.mark.parametrize(
+    ("bars", "problem"),
+    [
+        ("5,low,0,24,30,24\n5,low,0,25,30,25\n7,low,0,24,30,24\n", "row 3, wall = 'low': stands twice in its frame"),
+        ("5,low,0,.024,.03,.024\n", "makes the walls 3e-05 m wide, and the grains are 0.008 m apart: give"),
+    ],
+)
+def test_walls_that_stand_twice_or_in_another_unit_are_refused(tmp_path, capsys, bars, problem):
+    (tmp_path / "bars.csv").write_text("frame,wall,x1,y1,x2,y2\n" + bars)
+    file = write(tmp_path / "any.txt")
+    arguments = ("--columns", COLUMNS, "--pixel-size", PIXEL, "--y-down", "--walls", tmp_path / "bars.csv")
+    assert problem in refuse(capsys, "table", file, tmp_path / "out", *arguments)
+
+
 def test_parquet_and_utf_16(tmp_path, capsys):
     names = ("t", "rod", "X", "Y", "turn", "R")
     table = pyarrow.table({name: [row[k] for row in ROWS] for k, name in enumerate(names)})

@@ -238,6 +238,12 @@ def test_jumps_and_missing_poses_are_named():
         replace(tracks, position=np.where(lost[..., None], np.nan, tracks.position), status=status)
     )
     assert missing.cause == "missing_poses"
+    assert "photograph" not in missing.evidence
+    position[:, 44] = tracks.position[:, 44]
+    position[2, : N - 5], status = np.nan, tracks.status.copy()
+    status[2, : N - 5] = TrackStatus.LOST
+    (missing,) = named_poses(replace(tracks, position=position, status=status))
+    assert missing.evidence.endswith("of the poses are missing, most of those in photograph 2")
 
 
 def test_a_jump_is_no_outlier_where_all_rods_overlap_as_much():
