@@ -17,7 +17,8 @@ from ..bodies.grains import Array
 from ..calibration.gaps import GapRows, MeasuredSequence, find_gap_rows, measure_gaps
 from ..quantity import Quantity
 
-REACH = 0.1  # mean radii: greatest gap of pairs that may bear on the wall
+REACH = 0.1  # mean radii: greatest gap of pairs that may bear on the wall, in more than half of all frames
+FARTHEST = 1.0  # mean radii: greatest gap of these pairs in the others, where the camera may be displaced
 PRIOR = 0.05  # mean radii: prior standard deviation of a shift, and of a rotation or stretch at the farthest rod
 MIN_NOISE = 1e-4  # mean radii: lower limit of the noise of a gap
 ROUNDS = 12
@@ -27,7 +28,7 @@ MIN_EVIDENCE = 6.0  # mean square of the poses over their variance above which t
 
 @dataclass(frozen=True, slots=True)
 class CameraPose:
-    """Pose of the camera in every frame relative to its mean; if applied, positions were corrected by it."""
+    """Pose of the camera in every frame relative to its median; if applied, positions were corrected by it."""
 
     shift: Annotated[Array, Quantity("shift of the picture relative to the walls", "m", "frame xy", since=2)]
     rotation: Annotated[
@@ -73,7 +74,7 @@ def find_camera_pose(sequence: MeasuredSequence) -> CameraPose:
     In frame k, the gap of pair p at a wall of outward normal n is g = ḡ_p − n·(t_k + φ_k ẑ × r + λ_k r) + noise, with r
     the rod's position from the mean of all and ḡ_p the pair's usual gap. Poses minimise Σ W(e/(3 s)) e²/σ² plus their
     Gaussian priors in twelve rounds, with e the residual, W(u) = (1 + u²)⁻², ḡ_p the median of the pair, and s
-    shrinking from the prior to the noise; their mean over the photographs is zero. They are applied if the mean of
+    shrinking from the prior to the noise; their median over the photographs is zero. They are applied if the mean of
     pose²/variance exceeds 6.
     """
     radius = float(sequence.radius.mean())
@@ -103,12 +104,15 @@ def find_camera_pose(sequence: MeasuredSequence) -> CameraPose:
 
 
 def _wall_rows(sequence: MeasuredSequence, reach: float) -> GapRows:
-    """List the gaps to walls of pairs within reach in more than half of all frames."""
-    rows = find_gap_rows(sequence, -np.inf, wall_reach=reach)
-    often = (
-        np.bincount(rows.pair, minlength=int(rows.pair.max(initial=-1)) + 1) > 0.5 * sequence.present.any(axis=1).sum()
-    )
-    return rows.select(often[rows.pair])
+    """List the gaps to walls, in all frames, of pairs within reach [m] in more than half of these.
+
+    A photograph that is displaced opens the gaps at one wall and closes those at the opposite one: without the open
+    ones its displacement would seem smaller.
+    """
+    rows = find_gap_rows(sequence, -np.inf, wall_reach=FARTHEST / REACH * reach)
+    gap = measure_gaps(rows, sequence.position, sequence.endpoints, sequence.radius, sequence.side).gap
+    near = np.bincount(rows.pair[gap < reach], minlength=int(rows.pair.max(initial=-1)) + 1)
+    return rows.select((near > 0.5 * sequence.present.any(axis=1).sum())[rows.pair])
 
 
 def _fit(rows: GapRows, gap: Array, derivative: Array, noise: Array, prior: float, frames: int) -> tuple[Array, Array]:
@@ -131,7 +135,8 @@ def _fit(rows: GapRows, gap: Array, derivative: Array, noise: Array, prior: floa
             pose[k] += step
             variance[k] = np.diag(inverse)
         fitted = np.diff(ends) > 0
-        pose[fitted] -= pose[fitted].mean(axis=0)  # a common pose would be an error of the walls
+        # A common pose would be an error of the walls; the mean would hold part of a single displacement.
+        pose[fitted] -= np.median(pose[fitted], axis=0)
     return pose, variance
 
 

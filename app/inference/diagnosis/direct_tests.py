@@ -158,8 +158,7 @@ def examine_order(tracks: Tracks) -> list[Finding]:
     if f < 4:
         return []
     step, usual_step = (
-        np.array([_distance(tracks, k, k + 1, quantile) for k in range(f - 1)])
-        for quantile in (OUTLYING, OUTLYING_IN_TWO)
+        np.array([_distance(tracks, k, k + 1, repeated=each) for k in range(f - 1)]) for each in (True, False)
     )
     if not np.isfinite(step).any():
         return []
@@ -336,13 +335,19 @@ def _gradient(tracks: Tracks, k: int, both: NDArray[np.bool_]) -> Array:
     return displacement_gradient(tracks.position[k - 1], moved, both)
 
 
-def _distance(tracks: Tracks, k: int, other: int, quantile: float = OUTLYING_IN_TWO) -> float:
-    """Rms of the displacements [m] up to a quantile from one photograph to another; NaN where few rods are in both."""
+def _distance(tracks: Tracks, k: int, other: int, *, repeated: bool = False) -> float:
+    """Rms of most displacements [m] from one photograph to another; NaN where few rods are in both.
+
+    Relative to the median of all rods, since what they have in common may be a displacement of the camera; not for the
+    question whether a photograph is repeated.
+    """
     both = tracks.present_in(k) & tracks.present_in(other)
-    square = np.mean((tracks.position[other, both] - tracks.position[k, both]) ** 2, axis=1)
     if not both.mean() > IN_BOTH:
         return np.nan
-    return float(np.sqrt(np.mean(square[square <= np.quantile(square, quantile)])))
+    moved = tracks.position[other, both] - tracks.position[k, both]
+    square = np.mean((moved if repeated else moved - np.median(moved, axis=0)) ** 2, axis=1)
+    most = square <= np.quantile(square, OUTLYING if repeated else OUTLYING_IN_TWO)
+    return float(np.sqrt(np.mean(square[most])))
 
 
 def _shorter_if_swapped(tracks: Tracks, step: Array, k: int) -> bool:

@@ -189,6 +189,17 @@ def test_camera_motion_is_found_to_a_few_micrometres_and_none_at_rest() -> None:
     assert np.array_equal(resting.correct(sequence.position), sequence.position)
 
 
+@pytest.mark.parametrize("size", [0.2, 0.5])  # radii
+def test_one_displaced_photograph_is_found_and_the_others_stay(size) -> None:
+    sequence, _ = sheared_box()
+    displacement = size * RADIUS * np.array([0.8, -0.6])
+    sequence.position[3] += displacement
+    found = find_camera_pose(sequence)
+    assert found.applied
+    assert found.shift[3] == pytest.approx(displacement, abs=3e-5)
+    assert np.abs(np.delete(found.shift, 3, axis=0)).max() < 3e-5
+
+
 def test_too_few_rods_at_the_walls_give_no_pose() -> None:
     sequence, _ = sheared_box()
     few = MeasuredSequence(

@@ -223,6 +223,13 @@ def named_poses(tracks):
     return examine_poses(tracks, find_impossible_poses(tracks))
 
 
+def test_one_displaced_photograph_is_in_the_right_order():
+    tracks = rolling_tracks()
+    position = tracks.position.copy()
+    position[3] += [4e-3, -3e-3]
+    assert examine_order(replace(tracks, position=position)) == []
+
+
 def test_jumps_and_missing_poses_are_named():
     tracks = rolling_tracks()
     assert named_poses(tracks) == []
