@@ -118,7 +118,7 @@ class TrustSample:
             np.array([score.seed for score, _ in rows]),
             np.array([k for _, k in rows]),
             np.array([SCENARIOS[score.scenario].group for score, _ in rows]),
-            np.array([score.status[k] == "suspect" for score, k in rows]),
+            np.array([score.status[k] for score, k in rows], str),
             np.array([score.overlaps[k] for score, k in rows], np.bool_),
             np.array([score.loaded for score, _ in rows], np.bool_),
             np.array([score.r[k] for score, k in rows], float),

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import io
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from rich.console import Console
 from rodsight.solver.assessment.expected_correlation import CLOSED, MEASURES
 from rodsight.study.fitting.additive_fit import fit_additive
 from rodsight.study.scenarios.scenario_score import ScenarioScore
 from rodsight.study.scenarios.trust_study import (
     CLOSED_KINDS,
     CLOSED_STEPS,
+    TrustSample,
     describe_closed_fit,
     describe_fits,
     fit_by_title,
     fit_closed,
+    print_trust,
 )
 
 ALONE = 0.9  # trust by all other evidence
@@ -73,3 +78,20 @@ def test_only_tables_are_fitted_of_which_enough_kinds_are_read():
         "[expected_correlation.unloaded]", "[expected_correlation.unloaded_prediction]"
     ]  # fmt: skip
     assert list(fit_by_title(scores[:4])) == []
+
+
+def test_frames_are_counted_by_group_and_by_status():
+    rising = tuple(0.001 * k for k in range(11))
+    known = replace(unloaded("outer", 1), trust=tuple(0.5 + each for each in rising))
+    wrong = replace(
+        known, scenario="shear", r=tuple(0.6 + each for each in rising), trust=tuple(0.95 + each for each in rising),
+        status=("suspect",) * 11,
+    )  # fmt: skip
+    console = Console(width=300, record=True, file=io.StringIO())
+    print_trust(console, "all kinds", TrustSample.of([known, wrong]))
+    lines = {line.partition(":")[0]: line for line in console.export_text().splitlines()}
+    assert "10 frames, T > r + .03 in 0.0 %" in lines["settled"]
+    assert "0 have T ≥ 0.9" in lines["settled"]
+    assert "10 frames, T > r + .03 in 100.0 %" in lines["suspect"]
+    assert "10 have T ≥ 0.9, and a tenth of these r < 0.60" in lines["suspect"]
+    assert "20 frames" in lines["all"]
