@@ -53,6 +53,8 @@ def read_rods(file: Path, shape: tuple[int, int]) -> tuple[GrainGuess, list[str]
             sizes = [f"{columns} x {rows}" for rows, columns in (labels.shape, shape)]
             raise InputError(file, "", f"is {sizes[0]} pixels, the photographs are {sizes[1]}")
         rods, remarks = rods_of_labels(labels)
+        if not len(rods.id) and len(np.unique(labels)) == 2:
+            raise InputError(file, "", "has one label for all rods: give each rod a number of its own")
     else:
         rods, remarks = _read_table(file)
         outside = (rods.x < 0.0) | (rods.y < 0.0) | (rods.x > shape[1]) | (rods.y > shape[0])

@@ -353,7 +353,7 @@ def _find_rods_and_walls(
     else:
         source = Path(flags.walls)
         if not source.is_file():
-            raise InputError("--walls", flags.walls, "is neither auto, none nor a table frame,wall,x1,y1,x2,y2")
+            raise InputError("--walls", flags.walls, "is neither auto nor none, and there is no such file")
         if source.resolve() != (draft.folder / edits.WALLS).resolve():
             write_atomically(draft.folder / edits.WALLS, Path(source).read_bytes())
         draft.set_keys("walls", {"walls.file": edits.WALLS})

@@ -49,6 +49,13 @@ def test_specks_and_bars_are_left_out_and_counted():
     assert "without a round outline" in remarks[1]
 
 
+def test_one_label_for_all_rods_is_refused(tmp_path):
+    file = tmp_path / "mask.png"
+    cv2.imwrite(str(file), np.where(labels() > 0, 255, 0).astype(np.uint8))
+    with pytest.raises(InputError, match="has one label for all rods"):
+        read_rods(file, SHAPE)
+
+
 @pytest.mark.parametrize("form", ["area", "axes"])
 def test_a_table_of_imagej_is_read_for_its_first_slice(tmp_path, form):
     file = tmp_path / "Results.csv"
