@@ -123,6 +123,14 @@ def test_swapped_and_repeated_photographs_are_named():
     assert "photograph 4" in repeated.evidence
 
 
+def test_a_photograph_is_repeated_although_the_others_differ_by_a_common_motion_only():
+    tracks = rolling_tracks(step=0.0)
+    time = np.array([0, 1, 2, 3, 3, 4, 5, 6])[:, None, None]
+    (repeated,) = examine_order(replace(tracks, position=tracks.position + time * [2e-3, 0.0]))
+    assert repeated.cause == "photograph_repeated"
+    assert "photograph 4" in repeated.evidence
+
+
 def test_rests_and_uneven_steps_are_no_repetition_and_copies_are():
     tracks, rng = rolling_tracks(), np.random.default_rng(3)
 
