@@ -12,6 +12,7 @@ from .table import MUTATIONS, note
 QUICK = 63
 
 
+@pytest.mark.thorough
 def test_some_corrupted_inputs_do_no_harm(originals):
     count, problems = run_all(make_cases(originals, QUICK, SEED))
     assert problems == []

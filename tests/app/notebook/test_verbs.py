@@ -170,6 +170,7 @@ def test_moved_grains_and_another_friction_change_the_inputs(run):
     assert rodsight.what_if(run, friction=0.4).results.friction == 0.4
 
 
+@pytest.mark.thorough
 def test_a_grain_that_is_moved_far_is_no_outlier(run):
     moved = rodsight.what_if(run, 2, move={7: (0.0, 4e-4)})
     assert moved.grains(2)["y"][7] - run.grains(2)["y"][7] == pytest.approx(4e-4, abs=5e-5)
@@ -271,6 +272,7 @@ def test_bodies_that_are_none_are_refused_with_their_value(run, given, named):
     assert named in str(refused.value)
 
 
+@pytest.mark.thorough
 def test_a_table_of_verdicts_in_memory_has_its_own_name_and_the_user_as_reviewer(made_tracks, tmp_path, monkeypatch):
     made = rodsight.run(made_tracks, out=tmp_path / "run", settings=FEW)
     pair = made.contacts(1).query("j >= 0")[["frame", "i", "j"]].head(1)
