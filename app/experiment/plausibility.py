@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -225,12 +226,9 @@ def open_sides(walls: WallTracks, gravity: Sequence[float]) -> list[str]:
     ends = walls.endpoints[0, straight]
     inward = -outward_normals(ends)
     inmost_first = np.argsort(-(inward * ends.mean(axis=1)).sum(axis=1))
-    by_angle = {
-        round(float(np.arctan2(inward[w, 1], inward[w, 0])), FACING_DECIMALS): walls.name[straight[w]]
-        for w in inmost_first
-    }
+    by_angle = {_angle(*inward[w].tolist()): walls.name[straight[w]] for w in inmost_first}
     if any(gravity):
-        by_angle.setdefault(round(float(np.arctan2(gravity[1], gravity[0])), FACING_DECIMALS), "")
+        by_angle.setdefault(_angle(*gravity), "")
     order = sorted(by_angle)
     angle = np.diff([*order, order[0] + 2.0 * np.pi])
     wide = int(np.argmax(angle))
@@ -239,6 +237,11 @@ def open_sides(walls: WallTracks, gravity: Sequence[float]) -> list[str]:
     a, b = (by_angle[order[k % len(order)]] for k in (wide, wide + 1))
     where = f"between wall {a!r} and wall {b!r}" if a != b else f"opposite wall {a!r}"
     return [f"The boundary is open {where}: no wall confines the rods there."]
+
+
+def _angle(x: float, y: float) -> float:
+    """Return the angle of a direction [rad], rounded: what faces the same way has the same."""
+    return round(math.atan2(y, x), FACING_DECIMALS)
 
 
 def rods_beyond_ends(tracks: Tracks, walls: WallTracks) -> list[str]:

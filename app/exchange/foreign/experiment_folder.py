@@ -169,7 +169,7 @@ def _describe(folder: Path, imported: ImportedTracks, contents: FolderContents, 
         if contents.load:
             lines.append('load = "load.csv"')
         for wall, pressure in contents.pressure.items():
-            lines += [f"[walls.{json.dumps(wall, ensure_ascii=False)}]", f"pressure = {float(pressure)!r}"]
+            lines += [f"[walls.{json.dumps(wall, ensure_ascii=False)}]", f"pressure = {pressure!r}"]
     elif contents.cell is not None:
         lines += ["", "# The simulation's box is periodic both ways.", "[boundary]", 'periodic = "cell.csv"']
     elif contents.outer_grains:

@@ -50,16 +50,17 @@ class ImportRequest:
         if self.form not in get_args(FileFormat):
             raise InputError("import", repr(self.form), f"is not a form: there are {', '.join(get_args(FileFormat))}")
         for name in ("y_down", "degrees"):
-            if not isinstance(getattr(self, name), bool | np.bool_):
-                raise InputError(f"--{name.replace('_', '-')}", repr(getattr(self, name)), "is neither true nor false")
+            value, option = getattr(self, name), f"--{name.replace('_', '-')}"
+            if not isinstance(value, bool | np.bool_):
+                raise InputError(option, repr(value), "is neither true nor false")
         for name in ("pixel_size", "interval", "precision", "height", "radius", "corner_radius"):
-            value = getattr(self, name)
+            value, option = getattr(self, name), f"--{name.replace('_', '-')}"
             if value is None:
                 continue
             if isinstance(value, bool) or not isinstance(value, int | float | np.number):
-                raise InputError(f"--{name.replace('_', '-')}", repr(value), "is not a number")
+                raise InputError(option, repr(value), "is not a number")
             if not (math.isfinite(value) and value > 0.0):
-                raise InputError(f"--{name.replace('_', '-')}", str(value), "is not positive")
+                raise InputError(option, str(value), "is not positive")
 
 
 def import_files(request: ImportRequest, folder: Path) -> tuple[ImportedTracks, FolderContents]:

@@ -40,13 +40,16 @@ def read_by_columns(file: Path, columns: Mapping[str, str], *, degrees: bool) ->
 
     Raises InputError for a role without a column.
     """
-    own = {role: role for role in (*NEEDED, *OPTIONAL) if role in column_names(file)}
+    header = column_names(file)
+    own = {role: role for role in (*NEEDED, *OPTIONAL) if role in header}
+    if "radius" in own or columns.keys() & {"radius", "diameter"}:  # one of both: a named one, or the radius
+        own.pop("diameter", None)
+    if columns.keys() & {"radius", "diameter"}:
+        own.pop("radius", None)
     columns = own | dict(columns)
-    if "radius" in own and "diameter" in columns:
-        del columns["radius" if "diameter" not in own else "diameter"]
     missing = [role for role in NEEDED if role not in columns]
     if missing:
-        names = ", ".join(column_names(file)[:12])
+        names = ", ".join(header[:12])
         raise InputError(
             file, "", f"has no column for {', '.join(missing)}: give --columns {missing[0]}=… (columns: {names})"
         )

@@ -244,8 +244,8 @@ def examine_poses(tracks: Tracks, impossible: NDArray[np.bool_]) -> list[Finding
     missing = 1.0 - float(tracks.present[:, seen].mean()) if seen.any() else 0.0
     if MISSING < missing < 1.0:
         empty = np.flatnonzero(tracks.present[:, seen].mean(axis=1) < MOSTLY_MISSING)
-        photographs = ("photograph " if len(empty) == 1 else "photographs ") + ", ".join(map(str, empty[:NAMED]))
-        where = f", most of those in {photographs}" if len(empty) else ""
+        listed = ", ".join(map(str, empty[:NAMED]))
+        where = f", most of those in photograph{'s' if len(empty) > 1 else ''} {listed}" if len(empty) else ""
         found.append(finding("missing_poses", f"{100.0 * missing:.0f} % of the poses are missing{where}"))
     return found
 

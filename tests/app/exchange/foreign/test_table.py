@@ -66,6 +66,17 @@ def test_the_separator_that_excel_states_is_used(tmp_path, capsys):
     expect_rows(tmp_path / "out")
 
 
+@pytest.mark.parametrize(
+    ("named", "radius"),
+    [({}, 0.01), ({"diameter": "diameter"}, 0.02), ({"diameter": "D"}, 0.015), ({"radius": "R"}, 0.03)],
+)
+def test_the_size_that_is_named_is_used_and_else_the_radius(tmp_path, named, radius):
+    places = {"frame": [0, 0], "id": [1, 2], "x": [0.1, 0.1 + 2.0 * radius], "y": [0.1, 0.1]}
+    sizes = {"radius": 0.01, "diameter": 0.04, "D": 0.03, "R": 0.03}
+    table = rodsight.import_table(pd.DataFrame(places | sizes), tmp_path / "out", named, walls="none")
+    assert table["radius"].tolist() == [radius] * 2
+
+
 def test_separators_of_thousands_are_not_taken_for_decimals(tmp_path, capsys):
     rows = '0,1,270,"1,131",0,4\n0,2,278,"1,131",0,4\n1,1,270,999,0,4\n1,2,278,999,0,4\n'
     (tmp_path / "a.csv").write_text("t,rod,X,Y,turn,R\n" + rows)
