@@ -380,6 +380,8 @@ def find_experiment(results: Path, origin: Provenance) -> Path:
 
     Without a manifest the name of a file is not enough: what it names must have the input of the results.
     """
+    if not origin.experiment:
+        raise InputError(results, "", "this run was solved in memory: it has no experiment to be solved again")
     file = owner_of(results.parent)
     if file is None and has_input(Path(origin.experiment), origin.checksums):
         file = Path(origin.experiment)

@@ -280,6 +280,8 @@ def arrange_tracks(grains: Table, poses: Table, times: Table, precision: float) 
     ids, radius = grains.integers("id"), grains.numbers("radius")
     check_unique(grains, "id", ids)
     _all_positive(grains, "radius", radius)
+    order = np.argsort(ids)  # the same forces to the last bit, whatever the order of the rows
+    ids, radius = ids[order], radius[order]
     frame, of = poses.integers("frame"), poses.integers("id")
     check_unique(poses, "id", frame, of)
     frame_count = check_frames(poses, frame)

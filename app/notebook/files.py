@@ -30,6 +30,7 @@ from .shown_progress import shown_progress
 DRAWN = ("pictures", "video")
 FIGURES = "figures"
 DATA_FRAME, WALL_FRAME = "data frame", "data frame of walls"  # their names in messages
+BELOW_HEADER = 2  # line of a written table that holds its first row
 
 
 class ImportOptions(TypedDict, total=False):
@@ -135,7 +136,8 @@ def import_table(
         file = _as_file("source", source, Path(place) / DATA_FRAME)
         if "walls" in others:
             others["walls"] = str(_as_file("walls", others["walls"], Path(place) / WALL_FRAME))
-        with naming(Path(place) / DATA_FRAME, DATA_FRAME), naming(Path(place) / WALL_FRAME, WALL_FRAME):
+        files = [naming(Path(place) / name, name, first_row=BELOW_HEADER) for name in (DATA_FRAME, WALL_FRAME)]
+        with files[0], files[1]:
             imported, _ = import_files(ImportRequest(form, file, roles, **others), Path(folder))
     tracks = imported.tracks
     frame, grain = tracks.present.nonzero()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -13,7 +14,9 @@ from ..exchange.tidy_tables import TableName, make_table
 from ..out_of_date import state_of_source
 from ..process.counts import state_count
 from ..process.errors import FigureError, InputError, MissingFileError, MissingFrameError
-from ..results.hdf5.store import load_results
+from ..process.frame_range import ALL_FRAMES
+from ..results.hdf5.store import Provenance, load_results, origin_of, save_results
+from ..results.manifest import Manifest
 from ..results.results import Results
 from ..results.summary import summarize
 from ..run_folder import RECORDING
@@ -225,6 +228,40 @@ class Run:
         from ..exchange.contact_graph import make_graph
 
         return make_graph(self.results, self.checked_frame(frame))
+
+    def save(self, file: str | PathLike[str]) -> Path:
+        """Write the results to an HDF5 file, which `rodsight.open` and the commands read as any results.h5.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        InputError
+            If its folder does not exist, which is a FileNotFoundError as well, or the file is that of a run on the
+            disk, which `rodsight.run` alone writes.
+
+        Examples
+        --------
+        >>> run = rodsight.open("runs/shear")
+        >>> without = rodsight.what_if(run, friction=0.2)
+        >>> without.save("friction_0.2.h5").name
+        'friction_0.2.h5'
+        >>> rodsight.open("friction_0.2.h5").name
+        'my_test (what if)'
+        """
+        path = Path(file)
+        if not path.parent.is_dir():
+            raise MissingFileError(path, "", "there is no such folder")
+        if path.is_dir():
+            raise InputError(path, "", "is a folder: name a file in it, such as results.h5")
+        if Manifest(path.parent).piece(path.name):
+            raise InputError(path, "", "belongs to a run on the disk: choose another name")
+        origin = Provenance("", "", ALL_FRAMES, {}) if self.file is None else origin_of(self.file)
+        save_results(path, self.results, origin)
+        return path
 
     def view(self) -> Any:
         """Show the recording: below the cell of a notebook, otherwise in the viewer.

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+ROW = re.compile(r"\brow (\d+)\b")  # of a table, in a message
 
 
 class InputError(Exception):
@@ -32,13 +35,19 @@ class FigureError(InputError, ValueError):
 
 
 @contextmanager
-def naming(file: Path, name: str) -> Iterator[None]:
-    """Name a temporary file in bad input of the block as what the user gave: a data frame, a folder to be made."""
+def naming(file: Path, name: str, *, first_row: int = 0) -> Iterator[None]:
+    """Name a temporary file in bad input of the block as what the user gave: a data frame, a folder to be made.
+
+    first_row: line of the file that holds row 0 of a data frame, whose rows are counted from 0.
+    """
     try:
         yield
     except InputError as error:
-        error.args = (str(error).replace(str(file), name),)
-        error.problem = error.problem.replace(str(file), name)
+        text, here = str(error), str(file)
+        if first_row and text.startswith(here):
+            text = ROW.sub(lambda found: f"row {int(found[1]) - first_row}", text)
+        error.args = (text.replace(here, name),)
+        error.problem = error.problem.replace(here, name)
         raise
 
 

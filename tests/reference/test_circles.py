@@ -31,7 +31,7 @@ def two_discs():
 def test_circles_are_measured_as_one_by_one(narrow):
     image = two_discs()
     dark = np.full(image.shape, 30.0, np.float32)
-    contrast = np.full(image.shape, 150.0, np.float32)
+    contrast = np.full(image.shape, 150.0)
     rough = np.array([
         [40.0, 45.0, 20.0, 3.0, 0.0, np.inf], [40.0, 45.0, 20.0, 2.0, 0.1, 0.3], [80.0, 30.0, 9.0, 1.8, 0.0, np.inf],
         [99.0, 65.0, 9.0, 1.8, 0.0, np.inf], [116.0, 30.0, 14.0, 2.0, 0.0, 0.3], [60.0, 80.0, 8.0, 1.5, 0.0, np.inf],

@@ -10,9 +10,10 @@ from pathlib import Path
 
 from ...experiment.reading.input_files import regular
 from ...experiment.reading.tables import Table
+from ...process.counts import state_count
 from ...process.errors import InputError, MissingFileError
 
-PARQUET = b"PAR1"
+PARQUET, ZIP = b"PAR1", b"PK\x03\x04"  # first bytes of files
 COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+")
 SEPARATOR = re.compile(r"sep=(.)", re.IGNORECASE)  # the first line of tables that Excel writes
@@ -92,6 +93,8 @@ def read_text(file: Path) -> str:
         encodings = ("utf-16",)
     else:
         encodings = ("utf-8-sig", "latin-1")
+    if content[:4] == ZIP:
+        raise InputError(file, "", "is a workbook or an archive, and no text: save the table as CSV")
     if encodings[0] != "utf-16" and b"\0" in content:
         raise InputError(file, f"row {content[: content.index(0)].count(10) + 1}", "contains a NUL: it is not text")
     for encoding in encodings:
@@ -137,6 +140,7 @@ def _open_text(file: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
     if not kept:
         raise InputError(file, "", "is empty")
     delimiter = stated[1] if stated else _delimiter(kept[0][1])
+    _refuse_title(file, kept, delimiter)
     cells = [(number, _split(text, delimiter)) for number, text in kept]
     first = [cell.strip() for cell in cells[0][1]]
     if not all(NUMBER.fullmatch(cell) or cell in MISSING for cell in first):
@@ -145,6 +149,20 @@ def _open_text(file: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
     if len(named) == len(first):
         return named, iter(cells)
     return [str(k) for k in range(1, len(first) + 1)], iter(cells)
+
+
+def _refuse_title(file: Path, lines: list[tuple[int, str]], delimiter: str | None) -> None:
+    """Raise InputError where the first line is shorter than a header of the rows below. R leaves out one name."""
+    if len(lines) < 3:
+        return
+    names = len(_split(lines[0][1], delimiter))
+    below = {len(_split(text, _delimiter(text))) for _, text in lines[1:3]}
+    if len(below) == 1 and names + 1 < (columns := below.pop()):
+        raise InputError(
+            file, f"row {lines[0][0]}",
+            f"is no header: it names {state_count(names, 'column')}, and the rows below have {columns}. Delete it, or "
+            "begin it with #",
+        )  # fmt: skip
 
 
 def _delimiter(line: str) -> str | None:

@@ -15,7 +15,7 @@ from ...process.errors import InputError, MissingFileError
 from ..reading.input_files import InputFiles
 from .corrections import correct_value, explain_line
 from .input_sections import BoundarySection, GivenTracks, PhotographsSection, WallsSection
-from .keys import Key, find_key, nearest_key
+from .keys import Key, find_key, keys_beside, nearest_key
 from .section import Section, key
 from .tuning_sections import InferenceSections, SensitivitySection, TrackingSection
 from .unused_keys import unused_keys
@@ -197,7 +197,9 @@ def _explain_one(file: Path | str, first: ErrorDetails, kind: type[Section] = Ex
                 return name, InputError(file, where, wall)
         other = nearest_key(kind, name)
         value = "" if isinstance(first["input"], dict) else f" (value {first['input']!r})"
-        hint = f": did you mean {other}?" if other else ""
+        beside = keys_beside(kind, name)
+        hint = f": there are {', '.join(beside)}" if beside else ""
+        hint = f": did you mean {other}?" if other else hint
         return name, InputError(file, where, f"is not known{value}{hint}")
     if first["type"] == "missing" and not isinstance(first["loc"][-1], int):
         return name, InputError(file, where, f"is missing{_meaning(name)}")

@@ -79,11 +79,19 @@ def nearest_key(file: type[Section], name: str) -> str | None:
     last = {each.rpartition(".")[2]: each for each in reversed(names)}
     if parts[-1] in last:  # the key of another section
         return last[parts[-1]]
-    similar = get_close_matches(name, names, n=1, cutoff=MIN_SIMILARITY)
+    others = [each for each in names if each != name.rpartition(".")[0]]  # its own section is no other name for a key
+    similar = get_close_matches(name, others, n=1, cutoff=MIN_SIMILARITY)
     if similar:
         return similar[0]
     similar = get_close_matches(parts[-1], last, n=1, cutoff=MIN_SIMILARITY)
     return last[similar[0]] if similar else None
+
+
+def keys_beside(file: type[Section], name: str) -> list[str]:
+    """Return the keys of the section that a key, known or not, stands in, without the section's name."""
+    section = name.rpartition(".")[0]
+    inside = [key.name.removeprefix(f"{section}.") for key in list_keys(file) if key.name.startswith(f"{section}.")]
+    return [each for each in inside if "." not in each] if section else []
 
 
 def _with_any_name(parts: list[str]) -> str:

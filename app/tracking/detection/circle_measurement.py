@@ -74,7 +74,8 @@ class CircleMeasurer:
         self._coefficients = spline_coefficients(image)
         # An edge must exceed the noise as well, or an empty photograph is full of edges.
         self._dark, contrast = local_contrast(image, tile_size(radius))
-        self._contrast = np.maximum(contrast, NOISE_CONTRAST * image_noise(image))
+        least = np.float64(NOISE_CONTRAST * image_noise(image))  # of one type, or kernels are compiled for another
+        self._contrast = np.maximum(contrast, least)
 
     @cached_property
     def level(self) -> Image:

@@ -152,6 +152,7 @@ def not_overlapping(circles: Array, found: Array, overlapped: Array, *, allowed:
     apart = np.ones(len(circles), dtype=np.bool_)
     if len(found) == 0 or len(circles) == 0:
         return apart
+    circles = np.ascontiguousarray(circles, np.float64)
     found = np.ascontiguousarray(found[:, :3], np.float64)
     cell = float(found[:, 2].max())
     head, following = _empty_grid(found, cell), np.empty(len(found), np.intp)

@@ -73,6 +73,7 @@ def test_the_settings_page_is_up_to_date():
         ("contacts.kappa", "solver.kappa"),
         ("walls.upper left.presure", "walls.upper left.pressure"),
         ("wholly.unlike", None),
+        ("material.mu", None),  # not its own section
     ],
 )
 def test_a_key_that_is_not_known_has_a_nearest_one(wrong, meant):
@@ -89,6 +90,7 @@ def test_keys_are_found_for_a_wall_and_an_index_of_a_list():
     ("setting", "expected"),
     [
         ("solver.kapa=1", "key solver.kapa: is not known (value 1): did you mean solver.kappa?"),
+        ("material.mu=0.2", "key material.mu: is not known (value 0.2): there are density, length, friction, "),
         ("solver.kappa=-1", "(Kinematic number: weight of the measured motion relative to the contact forces)"),
         ("material.gravity=[0.0]", "Gravity in the plane"),
         (

@@ -18,7 +18,7 @@ def test_a_wrong_data_frame_is_called_a_data_frame(tmp_path):
     with pytest.raises(rodsight.InputError, match=r"^data frame: column x: there is no such column") as raised:
         rodsight.import_table(spots, tmp_path / "out", roles, radius=0.01)
     assert raised.value.problem.startswith("there is no such column")
-    with pytest.raises(rodsight.InputError, match=r"^data frame: row 3, X = 'wide': is not a number$"):
+    with pytest.raises(rodsight.InputError, match=r"^data frame: row 1, X = 'wide': is not a number$"):
         rodsight.import_table(spots, tmp_path / "out", roles | {"x": "X"}, radius=0.01)
     for option in ({"form": "tables"}, {"pixel_size": "wide"}):
         with pytest.raises(rodsight.InputError, match=r"is not a form: there are table, |'wide': is not a number$"):
@@ -62,6 +62,25 @@ def test_mistakes_are_input_errors_and_of_the_usual_kind(
     assert isinstance(raised.value, kind)
     assert str(raised.value)
     assert "\n" not in str(raised.value)
+
+
+def test_a_run_in_memory_is_saved_and_opened_again(run, tmp_path):
+    frame = run.checked_frame(2)
+    solved = rodsight.what_if(run, frame, friction=0.2, local=True)
+    file = solved.save(tmp_path / "changed.h5")
+    pd.testing.assert_frame_equal(rodsight.open(file).contacts(), solved.contacts())
+    assert rodsight.Run(file).save(tmp_path / "copy.h5").stat().st_size > 0
+    with pytest.raises(rodsight.InputError, match=r"changed\.h5: this run was solved in memory"):
+        rodsight.what_if(file, frame, friction=0.2)
+
+
+def test_a_file_of_a_run_on_the_disk_is_not_overwritten(run, tmp_path):
+    for file, words in (
+        (run.file, "belongs to a run on the disk"), (tmp_path, "is a folder"),
+        (tmp_path / "no/run.h5", "no such folder"),
+    ):  # fmt: skip
+        with pytest.raises(rodsight.InputError, match=words):
+            run.save(file)
 
 
 def test_a_run_without_a_recording_is_a_missing_file(run, tmp_path):

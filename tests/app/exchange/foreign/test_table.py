@@ -67,6 +67,21 @@ def test_the_separator_that_excel_states_is_used(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"PK\x03\x04more", "is a workbook or an archive, and no text: save the table as CSV"),
+        (b"Run 3, June\nt,rod,X,Y\n0,1,2,3\n0,2,4,5\n", "row 1: is no header: it names 2 columns, and the rows below"),
+        (b"tracks\n\nt rod X Y\n0 1 2 3\n", "row 1: is no header: it names 1 column, and the rows below have 4"),
+    ],
+)
+def test_a_workbook_and_a_title_are_refused_with_their_cure(tmp_path, capsys, content, words):
+    (tmp_path / "any.csv").write_bytes(content)
+    assert words in refuse(
+        capsys, "table", tmp_path / "any.csv", tmp_path / "out", "--columns", "frame=t,id=rod,x=X,y=Y"
+    )
+
+
+@pytest.mark.parametrize(
     ("named", "radius"),
     [({}, 0.01), ({"diameter": "diameter"}, 0.02), ({"diameter": "D"}, 0.015), ({"radius": "R"}, 0.03)],
 )
