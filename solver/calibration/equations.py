@@ -118,14 +118,15 @@ def radial_distortion(sequence: MeasuredSequence) -> Array:
 
     Notes
     -----
-    q(x) = |r|² r with r = (x − m)/a: third order, from the middle m of the walls instead of that of the picture, and of
-    length 1 at the farthest corner, at the distance a.
+    q(x) = |r|² r with r = (x − m)/a: third order, from the middle m of the packing instead of that of the picture, and
+    of length 1 at the farthest corner of its bounding box, at the distance a. Walls may be stated far longer.
     """
-    if sequence.wall_count == 0:
+    seen = sequence.position[sequence.present]
+    if sequence.wall_count == 0 or len(seen) == 0:
         return np.zeros_like(sequence.position)
-    middle = sequence.endpoints.mean(axis=(0, 1, 2))
-    reach = np.linalg.norm(sequence.endpoints - middle, axis=-1).max()
-    place = (sequence.position - middle) / reach
+    least, greatest = seen.min(axis=0), seen.max(axis=0)
+    reach = 0.5 * float(np.linalg.norm(greatest - least))
+    place = (sequence.position - 0.5 * (least + greatest)) / (reach if reach > 0.0 else 1.0)
     return np.where(sequence.present[..., None], np.sum(place**2, axis=2, keepdims=True) * place, 0.0)
 
 

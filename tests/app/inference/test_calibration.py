@@ -156,9 +156,8 @@ def test_photographs_are_shown_at_the_corrected_scale(corrected):
 
 def test_lens_is_found_and_corrected():
     tracks, walls = square_lattice(side=15, noise=2e-6, frames=6)
-    middle = walls.endpoints.mean(axis=(0, 1, 2))
-    reach = np.linalg.norm(walls.endpoints - middle, axis=-1).max()
-    place = (tracks.position - middle) / reach
+    least, greatest = tracks.position.min(axis=(0, 1)), tracks.position.max(axis=(0, 1))
+    place = (tracks.position - 0.5 * (least + greatest)) / (0.5 * np.linalg.norm(greatest - least))
     bend = 250e-6  # [m] at the farthest corner: one pixel of a photograph
     bent = tracks.position - bend * np.sum(place**2, axis=2, keepdims=True) * place
     measured = MeasuredSequence(

@@ -1,5 +1,6 @@
 """Geometry of constant errors, and statistics of gaps."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,10 +23,17 @@ def sequence(position, rotation=None, present=None):
 
 
 def test_radial_distortion_is_cubic_and_one_at_the_corner():
-    place = np.array([[[0.1, 0.1], [0.05, 0.05], [0.0, 0.0], [-0.05, 0.0]]])
+    place = np.array([[[0.1, 0.1], [0.05, 0.05], [0.0, 0.0], [-0.05, 0.0], [-0.1, -0.1]]])
     found = radial_distortion(sequence(place))[0]
     out = np.full(2, np.sqrt(0.5))
-    assert found == pytest.approx(np.array([out, out / 8.0, [0.0, 0.0], [-(0.05**3) / 0.02**1.5, 0.0]]))
+    assert found == pytest.approx(np.array([out, out / 8.0, [0.0, 0.0], [-(0.05**3) / 0.02**1.5, 0.0], -out]))
+
+
+def test_walls_far_longer_than_the_packing_do_not_move_the_middle_of_the_lens():
+    place = np.array([[[0.1, 0.1], [0.05, 0.05], [-0.1, -0.1]]])
+    given = sequence(place)
+    longer = replace(given, endpoints=given.endpoints + np.array([0.0, 3.0]) * (given.endpoints[..., 1:] > 0.0))
+    assert radial_distortion(longer) == pytest.approx(radial_distortion(given))
 
 
 def test_offsets_rotate_with_their_grains_from_their_first_frame():
