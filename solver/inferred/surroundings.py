@@ -53,6 +53,27 @@ class Surroundings:
             return place
         return place + np.mean(self.position[to, rows] - self.position[k, rows], axis=0)
 
+    def find_changed(self, place: Array, least: float) -> NDArray[np.intp]:
+        """Find the photographs, the first among them, between which the grains around a moving place rearrange.
+
+        Parameters
+        ----------
+        place : array (f, 2)
+            The place [m] in every photograph.
+        least : float
+            Least change [m] of a distance between two of the nearest grains since the photograph found before.
+        """
+        away = np.linalg.norm(self.position - place[:, None], axis=2) - self.radius
+        nearest = np.argsort(np.where(self.present, away, np.inf).min(axis=0))[:NEIGHBOURS]
+        around = np.where(self.present[:, nearest, None], self.position[:, nearest], np.nan)
+        distance = np.linalg.norm(around[:, :, None] - around[:, None], axis=3).reshape(len(place), -1)
+        found = [0]
+        for k in range(1, len(place)):
+            change = np.abs(distance[k] - distance[found[-1]])
+            if np.max(change, initial=0.0, where=np.isfinite(change)) > least:
+                found.append(k)
+        return np.array(found, np.intp)
+
     def gaps(self, place: Array, k: int, size: float) -> Array:
         """Compute the gaps (b,) [m] of a rod of this size at a place to the grains and walls around it."""
         centre, rim = self._bodies(place, k, 2.0 * size)

@@ -58,6 +58,13 @@ MUTANTS = [
         ("right_x, right_y = right_x + weight * gap * u", "right_x, right_y = right_x - weight * gap * u"),
         ("(1.0 if gap < 0.0 else 1.0 / (1.0 + (gap / scale) ** 2) ** 2)", "1.0"),
         ("0.5 * (xx + yy) / (xx * yy - xy * xy)", "0.5 / (xx + yy)"),
+        ("change = np.abs(distance[k] - distance[found[-1]])", "change = np.abs(distance[k] - distance[0])"),
+        ("np.where(self.present[:, nearest, None], self.position[:, nearest], np.nan)", "self.position[:, nearest]"),
+    ),
+    *mutants_of(
+        "solver/inferred/unseen_rods.py",
+        "tests/solver/inferred/test_unseen_rods.py",
+        ("held[around.find_changed(position, tolerance.apart)].sum()", "held.sum()"),
     ),
     *mutants_of(
         "solver/bodies/packing.py",

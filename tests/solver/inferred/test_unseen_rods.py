@@ -77,14 +77,23 @@ def test_two_photographs_are_not_enough(poses) -> None:
     assert infer(short, GONE, np.unique(poses["radius"])).count == 0
 
 
-def ring(closing: float) -> UnseenRods:
-    """Infer rods inside a ring of six around a hole of their size, one of which moves inward after two frames."""
+def ring(closing: float, touching: int = 6, turning: float = 0.0, moving: float = 0.0) -> UnseenRods:
+    """Infer rods inside a ring of six around a hole of their size, one of which moves inward after two frames.
+
+    touching: of the six, the others are too far out; turning [rad], moving (along the ring, of a radius): per frame.
+    """
     r = 8e-3
     angle = np.pi / 3 * np.arange(6)
     around = 2 * r * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     far = np.array([[0.05, 0.05], [-0.05, 0.05], [-0.05, -0.05], [0.05, -0.05]])
     position = np.tile(np.concatenate([around, far]), (4, 1, 1))
     position[2:, 0] *= 1.0 - closing
+    position[:, touching:6] *= 1.05
+    for k in range(4):
+        turned = np.array([k * turning, k * turning + k * moving / 2.0])  # the rod 0 along the ring
+        for rods, by in ((slice(0, 10), turned[0]), (slice(0, 1), turned[1] - turned[0])):
+            c, s = np.cos(by), np.sin(by)
+            position[k, rods] = position[k, rods] @ np.array([[c, s], [-s, c]])
     side = np.array([[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]])
     walls = np.tile(np.stack([side, np.roll(side, -1, axis=0)], axis=1), (4, 1, 1, 1))
     return infer_unseen(
@@ -99,6 +108,30 @@ def test_hole_that_other_rods_enter_holds_no_rod() -> None:
     # six gaps in all directions, and its motion relative to its neighbours, a tenth of its radius
     assert held.sigma == pytest.approx(1.0 / np.sqrt(3.0 / NOISE**2 + 1.0 / 8e-4**2), rel=1e-3)
     assert ring(closing=0.1).count == 0
+
+
+def test_contacts_that_stay_the_same_count_once() -> None:
+    """Three touch by chance in a packing that only turns; where it rearranges, a rod holds them apart."""
+    assert ring(closing=0.0, touching=3).count == 0
+    assert ring(closing=0.0, touching=3, turning=0.05).count == 0
+    assert ring(closing=0.0, touching=3, moving=-0.02).count == 1
+
+
+def test_the_photographs_in_which_the_grains_around_rearrange_are_found() -> None:
+    position = np.tile(np.array([[0.0, 0.02], [0.0, -0.02], [0.02, 0.0]]), (5, 1, 1))
+    position[2:, 0, 1] += 3e-4
+    position[3] += 0.1
+    position[4, 1, 0] += 1e-3
+    wall = np.tile([[[-1.0, -1.0], [1.0, -1.0]]], (5, 1, 1, 1))
+    around = Surroundings(np.full(3, 0.01), position, np.ones((5, 3), bool), wall, NOISE)
+    place = np.zeros((5, 2))
+    place[3] = 0.1
+    assert around.find_changed(place, 2e-4).tolist() == [0, 2, 4]
+    assert around.find_changed(place, 4e-4).tolist() == [0, 4]
+    lost = np.ones((5, 3), bool)
+    lost[2:, 0] = False
+    unseen = Surroundings(np.full(3, 0.01), position, lost, wall, NOISE)
+    assert unseen.find_changed(place, 2e-4).tolist() == [0, 4]
 
 
 def test_only_walls_that_bound_a_place_are_around_it() -> None:
