@@ -102,7 +102,7 @@ def check_radii(sources: PackingSources, tracks: Tracks, *, packed: bool = True)
     if sources.precision is not None and np.nanmin(tracks.sigma) > middle:
         raise InputError(
             *sources.precision,
-            f"is more than the rods' radius, {middle:g} m: it is the standard deviation of a position, in metres",
+            f"is more than the rods' radius, {middle:g} m: one of them is in another unit",
         )  # fmt: skip
     here, largest = tracks.position[0][tracks.present[0]], int(np.argmax(tracks.radius))
     across = float(np.hypot(*np.ptp(here, axis=0))) if len(here) > 2 else np.inf
