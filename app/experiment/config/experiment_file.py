@@ -70,7 +70,9 @@ def load_config(file: Path, settings: Sequence[str] = (), inputs: InputFiles | N
         text = (InputFiles() if inputs is None else inputs).read(file, text=True).decode("utf-8")
     except FileNotFoundError:
         raise MissingFileError(file, "", "there is no such file") from None
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError:
+        raise InputError(file, "", "is no text: name the folder of an experiment, or its experiment.toml") from None
+    except OSError as error:
         raise InputError(file, "", f"cannot be read ({error})") from None
     try:
         data = tomllib.loads(text)

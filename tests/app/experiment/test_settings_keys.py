@@ -80,6 +80,12 @@ def test_a_key_that_is_not_known_has_a_nearest_one(wrong, meant):
     assert nearest_key(ExperimentFile, wrong) == meant
 
 
+def test_a_file_of_results_is_no_experiment(tmp_path):
+    (tmp_path / "results.h5").write_bytes(b"\x89HDF\r\n")
+    with pytest.raises(InputError, match=r"results\.h5: is no text: name the folder of an experiment"):
+        load_config(tmp_path / "results.h5")
+
+
 def test_keys_are_found_for_a_wall_and_an_index_of_a_list():
     assert find_key(ExperimentFile, "walls.top.pressure") == find_key(ExperimentFile, "walls.NAME.pressure")
     assert find_key(ExperimentFile, "solver.reset_frames.0") == find_key(ExperimentFile, "solver.reset_frames")
