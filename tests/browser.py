@@ -14,6 +14,7 @@ from rodsight.solver.bodies.grains import Array
 # A page draws with WebGL in software.
 FLAGS = (
     "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
+    "--disable-gpu-compositing", "--disable-gpu-rasterization", "--disable-accelerated-2d-canvas",
     "--disable-dev-shm-usage", "--disable-features=LocalNetworkAccessChecks",
 )  # fmt: skip
 SECONDS = 90.0  # for what is drawn in software on a busy machine
