@@ -26,9 +26,11 @@ OVERLAPS = 2.0  # … plus, for soft grains, mean overlaps, which are distribute
 DEEPEST = 5.0  # … mean overlaps in the strongest contacts
 TOUCHES_FREE = 2  # bodies that any rod can touch by its choice of place
 LEAST_HELD = 0.45  # mean number of further contacts per photograph that is significant …
-# … and their least number in the photographs between which the grains around rearrange: a chance contact in a packing
-# at rest is the same contact in all of them. Of 49 rods left out (two kinds, seeds 20, 42, 61 to 63) one has less.
-LEAST_TOUCHES = 4
+LEAST_TOUCHES = 5.0  # … and their least number in all photographs together
+# A chance contact in a packing at rest is the same contact in all photographs. Where fewer are found in those between
+# which the grains around rearrange (of 49 rods left out, two kinds, seeds 20, 42, 61 to 63: one), …
+LEAST_REARRANGED = 4
+FIRMLY_HELD = 1.5  # … the mean number must be that of several contacts at once
 TOLERATED = 0.25  # fraction of photographs in which the rod may overlap another body
 STARTS = 4  # photographs in which places are searched, evenly spaced
 TRIED = 12  # trial radii where rods have no classes
@@ -186,9 +188,11 @@ def _track(around: Surroundings, place: Array, k: int, size: float, tolerance: _
 def _select_supported(proposed: list[_Rod], tolerance: _Tolerance) -> list[_Rod]:
     """Select rods with enough contacts, none of which overlaps one with more."""
     chosen: list[_Rod] = []
+    least = max(LEAST_HELD, LEAST_TOUCHES / len(proposed[0].position)) if proposed else 0.0
     fit = [
         each for each in proposed
-        if each.held >= LEAST_HELD and each.touches >= LEAST_TOUCHES and each.overlapping <= TOLERATED
+        if each.held >= least and each.overlapping <= TOLERATED
+        and (each.touches >= LEAST_REARRANGED or each.held >= FIRMLY_HELD)
     ]  # fmt: skip
     for rod in sorted(fit, key=lambda each: (-each.held, -each.radius)):
         free = True

@@ -77,7 +77,7 @@ def test_two_photographs_are_not_enough(poses) -> None:
     assert infer(short, GONE, np.unique(poses["radius"])).count == 0
 
 
-def ring(closing: float, touching: int = 6, turning: float = 0.0, moving: float = 0.0) -> UnseenRods:
+def ring(closing: float, touching: int = 6, turning: float = 0.0, moving: float = 0.0, frames: int = 4) -> UnseenRods:
     """Infer rods inside a ring of six around a hole of their size, one of which moves inward after two frames.
 
     touching: of the six, the others are too far out; turning [rad], moving (along the ring, of a radius): per frame.
@@ -86,18 +86,18 @@ def ring(closing: float, touching: int = 6, turning: float = 0.0, moving: float 
     angle = np.pi / 3 * np.arange(6)
     around = 2 * r * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     far = np.array([[0.05, 0.05], [-0.05, 0.05], [-0.05, -0.05], [0.05, -0.05]])
-    position = np.tile(np.concatenate([around, far]), (4, 1, 1))
+    position = np.tile(np.concatenate([around, far]), (frames, 1, 1))
     position[2:, 0] *= 1.0 - closing
     position[:, touching:6] *= 1.05
-    for k in range(4):
+    for k in range(frames):
         turned = np.array([k * turning, k * turning + k * moving / 2.0])  # the rod 0 along the ring
         for rods, by in ((slice(0, 10), turned[0]), (slice(0, 1), turned[1] - turned[0])):
             c, s = np.cos(by), np.sin(by)
             position[k, rods] = position[k, rods] @ np.array([[c, s], [-s, c]])
     side = np.array([[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]])
-    walls = np.tile(np.stack([side, np.roll(side, -1, axis=0)], axis=1), (4, 1, 1, 1))
+    walls = np.tile(np.stack([side, np.roll(side, -1, axis=0)], axis=1), (frames, 1, 1, 1))
     return infer_unseen(
-        np.full(10, r), position, np.ones((4, 10), bool), walls, UnseenRodSettings(NOISE, np.array([r]))
+        np.full(10, r), position, np.ones((frames, 10), bool), walls, UnseenRodSettings(NOISE, np.array([r]))
     )
 
 
@@ -112,9 +112,10 @@ def test_hole_that_other_rods_enter_holds_no_rod() -> None:
 
 def test_contacts_that_stay_the_same_count_once() -> None:
     """Three touch by chance in a packing that only turns; where it rearranges, a rod holds them apart."""
-    assert ring(closing=0.0, touching=3).count == 0
-    assert ring(closing=0.0, touching=3, turning=0.05).count == 0
-    assert ring(closing=0.0, touching=3, moving=-0.02).count == 1
+    assert ring(closing=0.0, touching=3, frames=6).count == 0
+    assert ring(closing=0.0, touching=3, turning=0.05, frames=6).count == 0
+    assert ring(closing=0.0, touching=3, moving=-0.02, frames=6).count == 1
+    assert ring(closing=0.0, touching=4, turning=0.05, frames=6).count == 1  # held by two beyond any two
 
 
 def test_the_photographs_in_which_the_grains_around_rearrange_are_found() -> None:
