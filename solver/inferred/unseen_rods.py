@@ -67,6 +67,7 @@ class _Tolerance:
 
     apart: float
     deep: float  # overlapping
+    exact: float  # apart, of hard grains
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +118,7 @@ def infer_unseen(
     if sizes is None:
         sizes = np.quantile(radius, np.linspace(0.0, 1.0, TRIED))
     exact = MISFIT * np.sqrt(2.0) * noise + SURFACE * float(radius.mean())
-    tolerance = _Tolerance(exact + OVERLAPS * overlap, exact + DEEPEST * overlap)
+    tolerance = _Tolerance(exact + OVERLAPS * overlap, exact + DEEPEST * overlap, exact)
     # Soft rods are reduced by half the mean overlap, so that their gaps vary about zero.
     radius, sizes, noise = radius - 0.5 * overlap, sizes - 0.5 * overlap, float(np.hypot(noise, overlap / np.sqrt(2.0)))
     if frames >= FEWEST_FRAMES and endpoints.shape[1] and tolerance.apart < COARSE * float(np.min(sizes)):
@@ -181,7 +182,7 @@ def _track(around: Surroundings, place: Array, k: int, size: float, tolerance: _
         held[f] = np.count_nonzero((gap < tolerance.apart) & (gap > -tolerance.deep)) - TOUCHES_FREE
         overlaps[f] = gap.min(initial=np.inf) < -tolerance.deep
     held = np.maximum(held, 0.0)
-    touches = int(held[around.find_changed(position, tolerance.apart)].sum())
+    touches = int(held[around.find_changed(position, tolerance.exact)].sum())
     return _Rod(size, position, sigma, float(held.mean()), touches, float(overlaps.mean()))
 
 
