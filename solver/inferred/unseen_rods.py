@@ -2,9 +2,8 @@
 
 A rod that bears force is held by its neighbours: with the right radius it touches at least three of them at once, in
 every photograph, which a rod of another radius or at another place does only by chance: the chance counts once while
-the packing around stays as it is. Such places are searched in
-every hole, tracked with the motion of their neighbours, and accepted one after the other, those with most contacts
-first.
+the packing around stays as it is. Such places are searched in every hole, tracked with the motion of their neighbours,
+and accepted one after the other, those with most contacts first.
 """
 
 from __future__ import annotations
@@ -75,9 +74,12 @@ class _Rod:
     radius: float
     position: Array  # (f, 2)
     sigma: Array  # (f,)
-    held: float
-    touches: int  # contacts beyond two in the photographs between which the grains around rearrange
+    contacts: Array  # (f,) beyond two
     overlapping: float  # fraction of photographs
+
+    @property
+    def held(self) -> float:
+        return float(self.contacts.mean())
 
 
 def infer_unseen(
@@ -125,7 +127,7 @@ def infer_unseen(
         near: Array | None = None
         for _ in range(PASSES):
             around = Surroundings(*_with(radius, position, present, rods), endpoints, noise, side)
-            new = _select_supported(_propose(around, sizes, near, tolerance), tolerance)
+            new = _select_supported(around, _propose(around, sizes, near, tolerance), tolerance)
             if not new:
                 break
             rods += new
@@ -181,19 +183,22 @@ def _track(around: Surroundings, place: Array, k: int, size: float, tolerance: _
         gap = around.gaps(position[f], f, size)
         held[f] = np.count_nonzero((gap < tolerance.apart) & (gap > -tolerance.deep)) - TOUCHES_FREE
         overlaps[f] = gap.min(initial=np.inf) < -tolerance.deep
-    held = np.maximum(held, 0.0)
-    touches = int(held[around.find_changed(position, tolerance.exact)].sum())
-    return _Rod(size, position, sigma, float(held.mean()), touches, float(overlaps.mean()))
+    return _Rod(size, position, sigma, np.maximum(held, 0.0), float(overlaps.mean()))
 
 
-def _select_supported(proposed: list[_Rod], tolerance: _Tolerance) -> list[_Rod]:
+def _is_held_anew(around: Surroundings, rod: _Rod, tolerance: _Tolerance) -> bool:
+    """Return whether a rod has enough contacts in the photographs between which the grains around it rearrange."""
+    return bool(rod.contacts[around.find_changed(rod.position, tolerance.exact)].sum() >= LEAST_REARRANGED)
+
+
+def _select_supported(around: Surroundings, proposed: list[_Rod], tolerance: _Tolerance) -> list[_Rod]:
     """Select rods with enough contacts, none of which overlaps one with more."""
     chosen: list[_Rod] = []
     least = max(LEAST_HELD, LEAST_TOUCHES / len(proposed[0].position)) if proposed else 0.0
     fit = [
         each for each in proposed
         if each.held >= least and each.overlapping <= TOLERATED
-        and (each.touches >= LEAST_REARRANGED or each.held >= FIRMLY_HELD)
+        and (each.held >= FIRMLY_HELD or _is_held_anew(around, each, tolerance))
     ]  # fmt: skip
     for rod in sorted(fit, key=lambda each: (-each.held, -each.radius)):
         free = True

@@ -140,7 +140,8 @@ def _open_text(file: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
     if not kept:
         raise InputError(file, "", "is empty")
     delimiter = stated[1] if stated else _delimiter(kept[0][1])
-    _refuse_title(file, kept, delimiter)
+    if not stated:
+        _refuse_title(file, kept, delimiter)
     cells = [(number, _split(text, delimiter)) for number, text in kept]
     first = [cell.strip() for cell in cells[0][1]]
     if not all(NUMBER.fullmatch(cell) or cell in MISSING for cell in first):

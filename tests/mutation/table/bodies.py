@@ -64,7 +64,7 @@ MUTANTS = [
     *mutants_of(
         "solver/inferred/unseen_rods.py",
         "tests/solver/inferred/test_unseen_rods.py",
-        ("held[around.find_changed(position, tolerance.exact)].sum()", "held.sum()"),
+        ("rod.contacts[around.find_changed(rod.position, tolerance.exact)].sum()", "rod.contacts.sum()"),
     ),
     *mutants_of(
         "solver/bodies/packing.py",
