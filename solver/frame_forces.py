@@ -165,7 +165,11 @@ class FrameForces:
     ] = NAN
     trust_penalties: Annotated[
         str,
-        Quantity("reasons that lower the trust with their cures, the worst first", since=2, formerly="frames/doubt"),
+        Quantity(
+            "reasons that lower the trust with their cures, the worst first, separated by ' · '",
+            since=2,
+            formerly="frames/doubt",
+        ),
     ] = ""
     friction: Annotated[Array | None, Quantity("coefficient used at the contact", dims="contact", since=2)] = None
     error_budget: Annotated[

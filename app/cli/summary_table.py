@@ -10,6 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ..process.counts import state_count
+from ..solver.assessment.reasons import split_reasons
 from ..solver.even_subset import even_subset
 from ..solver.frame_forces import FrameStatus
 
@@ -23,6 +24,7 @@ STATUS_STYLE = {
 }
 NOTICEABLE = 1.0  # [standard deviation]: smaller corrections of a wall are not reported
 MAX_ROWS = 40  # frames in the terminal's table; more are thinned evenly
+MOST_PENALTIES = 3  # reasons of the lowest trust that are listed
 
 
 def print_summary(console: Console, summary: dict[str, Any]) -> None:
@@ -81,7 +83,7 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
         + escape(f"{each['cause'].replace('_', ' ')}: {each['evidence']}; {each['effect']}. Cure: {each['cure']}.")
         for each in summary.get("diagnosis", [])
     ]
-    lines += _sd_line(summary) + budget_lines(summary) + _penalty_line(summary)
+    lines += _sd_line(summary) + budget_lines(summary) + penalty_lines(summary)
     lines += [load_line(each) for each in summary.get("loads", [])]
     scale = [each for each in summary.get("scale_sd", []) if each is not None]
     if scale:
@@ -211,8 +213,8 @@ def weight_line(summary: dict[str, Any]) -> str:
     )
 
 
-def _penalty_line(summary: dict[str, Any]) -> list[str]:
-    """State the lowest trust, and the largest penalty there, or of the least trusted frame that has one."""
+def penalty_lines(summary: dict[str, Any]) -> list[str]:
+    """State the lowest trust, and the largest penalties there, or of the least trusted frame that has some."""
     known = [(t, k) for k, t in enumerate(summary["trust"]) if t is not None]
     if not known:
         return []
@@ -223,7 +225,11 @@ def _penalty_line(summary: dict[str, Any]) -> list[str]:
         return []
     least, of = min(penalised)
     other = "" if of == frame else f"; {least:.2f} in frame {of}"
-    return [f"Lowest trust {trust:.2f} in frame {frame}{other}: {escape(reasons[of])}."]
+    named = split_reasons(reasons[of])
+    left = len(named) - MOST_PENALTIES
+    more = [f"- {state_count(left, 'smaller reason')}: see the tab Summary of the recording"] if left > 0 else []
+    shown = [f"- {escape(each)}" for each in named[:MOST_PENALTIES]]
+    return [f"Lowest trust {trust:.2f} in frame {frame}{other}, because", *shown, *more]
 
 
 def _failure_lines(failures: dict[int, str]) -> list[str]:

@@ -27,6 +27,7 @@ from ..solver.assessment.penalties import (
     penalise_contradiction,
     penalise_friction,
 )
+from ..solver.assessment.reasons import join_reasons
 from ..solver.bodies.motion import Snapshot
 from ..solver.convex.friction_check import FrictionCheck
 from ..solver.frame_forces import FrameForces, FrameStatus
@@ -198,7 +199,7 @@ def _limit_by_second(forces: FrameForces, frames: Sequence[FrameForces]) -> Fram
     words = f"the next photograph has a trust of {second.trust:.2f}, and this one no motion of its own"
     return replace(
         forces, trust=second.trust, expected_correlation=min(forces.expected_correlation, second.expected_correlation),
-        trust_penalties="; ".join(filter(None, (words, forces.trust_penalties))),
+        trust_penalties=join_reasons(words, forces.trust_penalties),
     )  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from ..statistics.sliding import contact_state, sliding_probability_at
 from .evidence import Evidence
 from .expected_correlation import contradict, losses
 from .intervals.force_intervals import correlation_by_intervals, widen_for_friction
+from .reasons import join_reasons
 from .trust import Assessment, interior_limit, motion_assessment, unseen_penalty
 
 COARSE_STEP = math.radians(0.25)  # [rad] shear of a step beyond which forces cannot be followed
@@ -68,7 +69,7 @@ def find_penalties(evidence: Evidence) -> list[Penalty]:
 
 def describe_penalties(evidence: Evidence) -> str:
     """Penalties of at least REPORTED in words, the largest first; empty where there is none."""
-    return "; ".join(each.words for each in find_penalties(evidence) if each.fraction >= REPORTED)
+    return join_reasons(*(each.words for each in find_penalties(evidence) if each.fraction >= REPORTED))
 
 
 def penalise_friction(frame: FrameForces, check: FrictionCheck | None, *, measured: bool = False) -> FrameForces:
@@ -97,7 +98,7 @@ def penalise_friction(frame: FrameForces, check: FrictionCheck | None, *, measur
         f"given {check.given:g}, and smooth walls, a base with friction or a wrong step look the same"
     )
     # last: it widens the intervals, and the trust contains the power gap that it follows from
-    penalised = replace(frame, trust_penalties="; ".join(filter(None, (frame.trust_penalties, words))))
+    penalised = replace(frame, trust_penalties=join_reasons(frame.trust_penalties, words))
     if frame.sliding_probability is not None:
         slides = sliding_probability_at(
             frame.sliding_probability, check.given, check.measured, 1.0 - frame.position_weight
@@ -126,7 +127,7 @@ def penalise_contradiction(frame: FrameForces, words: str) -> FrameForces:
         frame,
         trust=contradict(frame.trust),
         expected_correlation=contradict(frame.expected_correlation),
-        trust_penalties="; ".join(filter(None, (words, frame.trust_penalties))),
+        trust_penalties=join_reasons(words, frame.trust_penalties),
     )
 
 
@@ -174,7 +175,7 @@ def limit_trust(frame: FrameForces, most: float, expected: float, words: str) ->
         frame,
         trust=most,
         expected_correlation=min(frame.expected_correlation, expected),
-        trust_penalties="; ".join(filter(None, (words, frame.trust_penalties))),
+        trust_penalties=join_reasons(words, frame.trust_penalties),
     )
 
 

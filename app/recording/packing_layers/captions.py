@@ -7,6 +7,7 @@ import rerun as rr
 
 from ...drawing.frame_caption import caption_of_strain, caption_of_time, caption_of_trust
 from ...process.counts import state_count
+from ...solver.assessment.reasons import split_reasons
 from ...solver.frame_forces import FrameForces, FrameStatus
 from ...solver.statistics.frame_statistics import FrameStatistics
 from ..look import entities
@@ -58,14 +59,13 @@ def write_card(scene: Scene, forces: FrameForces, statistics: FrameStatistics, t
         f"scale of all forces ± {100.0 * forces.scale_sd:.0f} %" if _known(forces.scale_sd) else "",
     ]
     reasons = [] if forces.status is FrameStatus.SETTLED else [each.strip() for each in forces.reason.split(";")]
-    penalties = [each.strip() for each in forces.trust_penalties.split(";")]
     lost = scene.tracks.id[scene.tracks.frame(forces.frame).lost[0]].tolist()
     lines = [head + expected + ".", ", ".join(each for each in values if each) + "."]
     if lost:
         lines.append(
             f"Lost: {state_count(len(lost), 'rod')}: {', '.join(map(str, lost[:12]))}{' …' if len(lost) > 12 else ''}."
         )
-    listed = list(dict.fromkeys(each for each in [*reasons, *penalties] if each))
+    listed = list(dict.fromkeys(each for each in [*reasons, *split_reasons(forces.trust_penalties)] if each))
     if listed:
         lines.append("What lowers the trust:\n\n" + "\n".join(f"- {each}" for each in listed))
     return "\n\n".join(lines)

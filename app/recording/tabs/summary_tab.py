@@ -13,6 +13,7 @@ import rerun as rr
 from ...drawing.uncertainty import SURE
 from ...process.counts import state_count
 from ...results.results import setting
+from ...solver.assessment.reasons import split_reasons
 from ...solver.bodies.grains import Array
 from ...solver.frame_forces import FrameForces, FrameStatus
 from ...solver.statistics.agreement import Agreement
@@ -167,10 +168,13 @@ def _camera(scene: Scene) -> str:
 def _trust_penalties(frames: list[FrameSummary]) -> str:
     """Return the reasons that lower the trust of the least trusted frames; empty if there are none."""
     lowest = sorted((f.trust, f.frame, f.trust_penalties) for f in frames if f.trust_penalties and np.isfinite(f.trust))
-    rows = [f"- frame {frame}, T {trust:.2f}: {_cell(reasons)}" for trust, frame, reasons in lowest[:MAX_REASONS]]
-    if not rows:
+    listed = lowest[:MAX_REASONS]
+    if not listed:
         return ""
-    some = f" ({len(rows)} of {len(lowest)} frames)" if len(rows) < len(lowest) else ""
+    rows: list[str] = []
+    for trust, frame, reasons in listed:
+        rows += [f"- frame {frame}, T {trust:.2f}", *(f"  - {printable(each)}" for each in split_reasons(reasons))]
+    some = f" ({len(listed)} of {len(lowest)} frames)" if len(listed) < len(lowest) else ""
     return "\n".join([f"Reasons that lower T, least trusted frames first{some}:", "", *rows])
 
 

@@ -110,7 +110,7 @@ def test_a_contradicted_friction_is_reported_with_what_else_looks_like_it():
     assert low.trust == 0.9  # the evidence of each frame counts, not the suspected cause
     # friction is not blamed before the evidence of the frame
     assert low.trust_penalties.startswith(
-        "noise; the motion fits a friction of 0.40 (0.34 to 0.46) better than the given 0.25"
+        "noise · the motion fits a friction of 0.40 (0.34 to 0.46) better than the given 0.25"
     )
     assert "smooth walls" in low.trust_penalties
     for agrees in (None, check(0.26, 0.22, 0.30), check(0.40, 0.34, 0.46, enclosed=False)):
@@ -162,7 +162,7 @@ def test_a_frame_of_contradictory_input_is_trusted_less_for_a_reason_that_comes_
     penalised = penalise_contradiction(frame, "photographs reversed")
     assert penalised.trust == contradict(0.9) < 0.9
     assert penalised.expected_correlation == contradict(0.97) < 0.97
-    assert penalised.trust_penalties == "photographs reversed; noise"
+    assert penalised.trust_penalties == "photographs reversed · noise"
     failed = failed_frame(3, "no contacts", 4, 2)
     assert penalise_contradiction(failed, "photographs reversed") is failed
 

@@ -180,7 +180,7 @@ def test_trust_in_smoothed_tracks_is_limited_with_its_reason():
     limited = limit_for_smoothing(frame)
     assert limited.trust == TRUST_OF_SMOOTHED
     assert limited.expected_correlation == EXPECTED_OF_SMOOTHED
-    assert limited.trust_penalties == f"{SMOOTHED}; noise"
+    assert limited.trust_penalties == f"{SMOOTHED} · noise"
     low = replace(frame, trust=0.3)
     assert limit_for_smoothing(low) is low
 
