@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
@@ -15,6 +14,7 @@ from .pictures.picture_file import MAX_PIXELS, content_of, grey_of, pixels_of, t
 from .pictures.png_chunks import is_whole_png
 from .reading.input_files import InputFiles
 from .reading.photograph_order import in_order
+from .reading.photograph_pattern import photographs_of
 
 
 class Photographs(Sequence[Image]):
@@ -48,23 +48,7 @@ class Photographs(Sequence[Image]):
     def matching(cls, folder: Path, pattern: str, *, source: Path | str | None = None) -> Photographs:
         """Return the photographs of `folder` whose names match the glob `pattern`, such as "photos/*.png"."""
         place = folder if source is None else source
-        try:
-            if Path(pattern).is_absolute():
-                found = list(Path(Path(pattern).anchor).glob(str(Path(pattern).relative_to(Path(pattern).anchor))))
-            else:
-                found = list(folder.glob(pattern))
-        except ValueError as error:
-            raise InputError(place, f"photographs.files = {pattern!r}", str(error)) from None
-        except OSError as error:
-            if error.errno != errno.ENAMETOOLONG:
-                raise
-            raise InputError(place, f"photographs.files = {pattern[:60]!r} …", "is too long for a name") from None
-        for broken in sorted(file for file in found if file.is_symlink() and not file.exists()):
-            raise InputError(broken, "", "is a link to a file that does not exist")
-        files = [file for file in found if file.is_file()]
-        if not files:
-            raise InputError(place, f"photographs.files = {pattern!r}", "no file matches")
-        return cls(files, source=place)
+        return cls(photographs_of(folder, pattern, place), source=place)
 
     @property
     def shape(self) -> tuple[int, int]:

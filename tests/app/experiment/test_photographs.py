@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -103,6 +104,32 @@ def test_colour_becomes_luma(tmp_path: Path, kind: type, channels: int) -> None:
 def test_no_match_names_the_pattern(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"\*\.png.*no file matches"):
         Photographs.matching(tmp_path, "*.png")
+
+
+@pytest.mark.parametrize(
+    ("pattern", "meant"),
+    [
+        ("shots", "../shots/*.png"),
+        ("shots/*.png", "../shots/*.png"),
+        ("../shots", "../shots/*.png"),
+        ("own", "own/*.png"),
+    ],
+)
+def test_what_was_meant_is_named_where_nothing_matches(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pattern: str, meant: str
+) -> None:
+    for name in ("shots", "experiment/own"):
+        (tmp_path / name).mkdir(parents=True)
+        write(tmp_path, f"{name}/1.png", np.zeros((3, 3), np.uint8))
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=f"no file matches; write '{re.escape(meant)}'$"):
+        Photographs.matching(Path("experiment"), pattern)
+    assert len(Photographs.matching(Path("experiment"), meant)) == 1
+
+
+def test_nothing_is_proposed_where_nothing_is_there(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no file matches$"):
+        Photographs.matching(tmp_path, "shots/*.png")
 
 
 def test_no_files_are_refused() -> None:
