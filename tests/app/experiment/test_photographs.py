@@ -122,13 +122,13 @@ def test_what_was_meant_is_named_where_nothing_matches(
         (tmp_path / name).mkdir(parents=True)
         write(tmp_path, f"{name}/1.png", np.zeros((3, 3), np.uint8))
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match=f"no file matches; write '{re.escape(meant)}'$"):
+    with pytest.raises(InputError, match=rf"no file matches; write '{re.escape(meant)}'$"):
         Photographs.matching(Path("experiment"), pattern)
     assert len(Photographs.matching(Path("experiment"), meant)) == 1
 
 
 def test_nothing_is_proposed_where_nothing_is_there(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no file matches$"):
+    with pytest.raises(InputError, match=r"no file matches$"):
         Photographs.matching(tmp_path, "shots/*.png")
 
 
