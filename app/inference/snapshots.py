@@ -15,6 +15,7 @@ from ..solver.calibration.gaps import MeasuredSequence
 from ..solver.inferred.unknown_rotations import fill_unknown_rotations
 from ..tracks import Tracks, WallTracks
 
+MOST_SPREAD = 60.0  # over the usual standard deviation of a centre: beyond, a rim is not seen at all
 INTERPOLATED_SIGMAS = (
     10.0  # standard deviations of an interpolated pose over those of a measured one: a weak measurement
 )
@@ -49,8 +50,19 @@ def measure_sequence(tracks: Tracks, walls: WallTracks) -> MeasuredSequence:
     sigma = np.where(tracks.interpolated, INTERPOLATED_SIGMAS * tracks.sigma, tracks.sigma)
     sigma[~tracks.present] = 0.0
     return MeasuredSequence(
-        tracks.radius, tracks.position, rotation, present, walls.endpoints, sigma, walls.side, walls.cell
-    )
+        tracks.radius, tracks.position, rotation, present, walls.endpoints, sigma, walls.side, walls.cell,
+        _centre_spread(tracks),
+    )  # fmt: skip
+
+
+def _centre_spread(tracks: Tracks) -> Array | None:
+    """Return how much more uncertain each centre is than most of them (n,); None where all are alike."""
+    sd = tracks.centre_sigma
+    if sd is None or not np.any(known := np.isfinite(sd) & (sd > 0.0)):
+        return None
+    usual = float(np.median(sd[known]))
+    spread = np.where(known, np.clip(sd / usual, 1.0, MOST_SPREAD), 1.0)
+    return None if np.all(spread == 1.0) else spread
 
 
 def _rotations(tracks: Tracks, walls: WallTracks) -> Array:

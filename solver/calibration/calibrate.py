@@ -138,6 +138,7 @@ class Calibration:
             sequence.sigma,
             sequence.side,
             sequence.cell,
+            sequence.centre_spread,
         )
 
 

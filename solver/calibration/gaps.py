@@ -30,6 +30,8 @@ class MeasuredSequence:
     sigma: Array  # (f, n) [m], standard deviation of the random error of a position component
     side: Sides = None  # (w,) which walls are circles, as of Walls; None: none
     cell: Array | None = None  # (f, 2, 2) [m] vectors of the periodic cell, in place of walls
+    # (n,) expected size of a centre's constant error, over that of most grains; None: alike
+    centre_spread: Array | None = None
 
     def __post_init__(self) -> None:
         f, n = self.present.shape
@@ -42,6 +44,8 @@ class MeasuredSequence:
         for name in ("position", "rotation", "sigma"):
             if not np.all(np.isfinite(getattr(self, name)[self.present])):
                 raise ValueError(f"the {name} of a present grain is not finite")
+        if self.centre_spread is not None and not (self.centre_spread.shape == (n,) and np.all(self.centre_spread > 0)):
+            raise ValueError(f"centre_spread must be ({n},) and positive")
 
     def spread_frames(self, count: int) -> NDArray[np.int64]:
         """Choose at most `count` frames, evenly spaced, the first and the last included."""
@@ -53,7 +57,7 @@ class MeasuredSequence:
         k = self.spread_frames(count)
         return MeasuredSequence(
             self.radius, self.position[k], self.rotation[k], self.present[k], self.endpoints[k], self.sigma[k],
-            self.side, None if self.cell is None else self.cell[k],
+            self.side, None if self.cell is None else self.cell[k], self.centre_spread,
         )  # fmt: skip
 
     @property

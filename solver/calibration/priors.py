@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from ..bodies.grains import Array
 from ..quantity import Quantity
 from .equations import GapEquations
-from .gaps import GapRows, MeasuredSequence, find_gap_rows
+from .gaps import GapRows, MeasuredSequence, find_gap_rows, measure_gaps
 from .weights import contact_width
 
 REACH = 4.0  # calibration pairs have gaps below this many times the scale of the errors
 REACH_OF_NOISE = 6.0  # … plus this many standard deviations of the noise
+WIDEST_CENTRE = 0.1  # of the mean radius: prior of the centre of a grain whose rim is hardly seen, at most
 MIN_EXCESS = 0.1  # of the noise: smaller constant errors cannot be detected
 FINEST_SURFACE = 1e-5  # of the mean radius: below this no real grain is round
 
@@ -105,21 +106,31 @@ def find_calibration_pairs(sequence: MeasuredSequence, priors: CalibrationPriors
 
     Notes
     -----
-    With σ_g² = σ_c² + σ_r² + σ_class², s_0² = 2 σ_g² between grains and σ_g² + σ_wall² + (σ_tilt L/2)² + σ_lens² at a
-    wall of the greatest length L. Pairs with gaps below 4 s_0 + 6 (√2 σ_max + ō) are listed.
+    With σ_g² = σ_c² + σ_r² + σ_class² of a grain, s_0² = σ_g² + σ_h² between grains g and h, and σ_g² + σ_wall² +
+    (σ_tilt L/2)² + σ_lens² at a wall of the greatest length L. Pairs with gaps below 4 s_0 + 6 (√2 σ_max + ō) are
+    listed.
     """
-    grain = priors.centre**2 + priors.radius**2 + priors.radius_class**2
+    count = sequence.grain_count
+    grain = _centre_prior(sequence, priors) ** 2 + priors.radius**2 + priors.radius_class**2
     half = 0.5 * float(_wall_length(sequence).max(initial=0.0))
-    pair = np.sqrt(2.0 * grain)
-    wall = np.sqrt(grain + priors.wall**2 + (half * priors.wall_tilt) ** 2 + priors.lens**2)
+    of_wall = priors.wall**2 + (half * priors.wall_tilt) ** 2 + priors.lens**2
     noise = np.sqrt(2.0) * float(sequence.sigma[sequence.present].max(initial=0.0)) + overlap
+    widest = float(grain.max(initial=0.0))
     rows = find_gap_rows(
-        sequence, REACH * pair + REACH_OF_NOISE * noise, wall_reach=REACH * wall + REACH_OF_NOISE * noise
-    )
-    with_wall = rows.with_wall(sequence.grain_count)
-    start = np.maximum(np.where(with_wall, wall, pair), np.finfo(float).tiny)
+        sequence, REACH * np.sqrt(2.0 * widest) + REACH_OF_NOISE * noise,
+        wall_reach=REACH * np.sqrt(widest + of_wall) + REACH_OF_NOISE * noise,
+    )  # fmt: skip
+    with_wall = rows.with_wall(count)
+    start = np.sqrt(grain[rows.i] + np.where(with_wall, of_wall, grain[rows.second_grain(count)]))
+    if sequence.centre_spread is not None:
+        gap = measure_gaps(
+            rows, sequence.position, sequence.endpoints, sequence.radius, sequence.side, sequence.cell
+        ).gap
+        near = gap < REACH * start + REACH_OF_NOISE * noise
+        rows, with_wall, start = rows.select(near), with_wall[near], start[near]
+    start = np.maximum(start, np.finfo(float).tiny)
     first = sequence.sigma[rows.frame, rows.i]
-    second = np.where(with_wall, 0.0, sequence.sigma[rows.frame, rows.second_grain(sequence.grain_count)])
+    second = np.where(with_wall, 0.0, sequence.sigma[rows.frame, rows.second_grain(count)])
     finest = FINEST_SURFACE * float(sequence.radius.mean())
     return CalibrationPairs(rows, start, np.sqrt(first**2 + second**2 + finest**2), overlap, ~with_wall)
 
@@ -170,16 +181,25 @@ def reduce_priors(
 
     Notes
     -----
-    σ² = ⟨û²⟩ + ⟨draw²⟩, means over all grains (and components, and draws).
+    σ² = ⟨û²⟩ + ⟨draw²⟩, means over all grains (and components, and draws), each over its expected spread.
     """
 
-    def reduce(part: slice, limit: float) -> float:
+    def reduce(part: slice, limit: float, spread: Array | float = 1.0) -> float:
         if limit == 0.0:
             return 0.0
-        return min(limit, float(np.sqrt(np.mean(unknowns[part] ** 2) + np.mean(draws[:, part] ** 2))))
+        errors, drawn = unknowns[part] / spread, draws[:, part] / spread
+        return min(limit, float(np.sqrt(np.mean(errors**2) + np.mean(drawn**2))))
 
-    layout = equations.layout
-    return replace(limits, centre=reduce(layout.offset, limits.centre), radius=reduce(layout.radius, limits.radius))
+    layout, spread = equations.layout, equations.sequence.centre_spread
+    of_centres = 1.0 if spread is None else np.repeat(spread, 2)
+    centre = reduce(layout.offset, limits.centre, of_centres)
+    return replace(limits, centre=centre, radius=reduce(layout.radius, limits.radius))
+
+
+def _centre_prior(sequence: MeasuredSequence, priors: CalibrationPriors) -> Array:
+    """Prior standard deviation (n,) [m] of a component of every centre."""
+    spread = np.ones(sequence.grain_count) if sequence.centre_spread is None else sequence.centre_spread
+    return np.minimum(priors.centre * spread, max(priors.centre, WIDEST_CENTRE * float(sequence.radius.mean())))
 
 
 def _wall_length(sequence: MeasuredSequence) -> Array:
@@ -190,7 +210,7 @@ def prior_vector(equations: GapEquations, priors: CalibrationPriors) -> Array:
     """Return the prior standard deviation (u,) of every unknown."""
     layout = equations.layout
     sd = np.zeros(layout.count)
-    sd[layout.offset] = priors.centre
+    sd[layout.offset] = np.repeat(_centre_prior(equations.sequence, priors), 2)
     sd[layout.radius] = priors.radius
     sd[layout.wall] = priors.wall
     sd[layout.radius_class] = priors.radius_class

@@ -11,6 +11,7 @@ from rodsight.experiment.config.experiment_file import ExperimentFile
 from rodsight.experiment.scaling import make_scale
 from rodsight.inference.correction.calibration import calibrate_tracks, own_gap_error, radius_classes
 from rodsight.inference.inference_settings import radii_are_metres, settings_of
+from rodsight.inference.snapshots import MOST_SPREAD, measure_sequence
 from rodsight.results.calibration_summary import calibration_facts
 from rodsight.solver.calibration.calibrate import Calibration, calibrate
 from rodsight.solver.calibration.gaps import MeasuredSequence
@@ -188,3 +189,14 @@ def test_errors_of_single_rods_make_the_corrected_part_of_a_gap() -> None:
     sizes[:2] = 2  # too few rods of one size
     assert own_gap_error(of_one) > 1e-4
     assert own_gap_error(of_one, sizes) == pytest.approx(np.sqrt(2.0 / n) * 1.6e-4)  # of the one that is alone
+
+
+def test_rods_whose_rims_were_hardly_seen_may_err_by_more() -> None:
+    tracks, walls = square_lattice()
+    sd = np.full(tracks.grain_count, 4e-6)
+    assert measure_sequence(tracks, walls).centre_spread is None
+    assert measure_sequence(replace(tracks, centre_sigma=sd), walls).centre_spread is None
+    sd[:4] = 8e-6, 2e-6, np.nan, 1.0
+    spread = measure_sequence(replace(tracks, centre_sigma=sd), walls).centre_spread
+    assert spread is not None
+    np.testing.assert_allclose(spread[:5], [2.0, 1.0, 1.0, MOST_SPREAD, 1.0])

@@ -86,7 +86,10 @@ MUTANTS = [
     *mutants_of(
         "solver/calibration/priors.py",
         "tests/solver/calibration/test_calibrate.py",
-        ("+ np.mean(draws[:, part] ** 2)", ""),
+        ("+ np.mean(drawn**2)", ""),
+        ("np.repeat(_centre_prior(equations.sequence, priors), 2)", "priors.centre"),
+        ("near = gap < REACH * start + REACH_OF_NOISE * noise", "near = gap < 0.0"),
+        ("WIDEST_CENTRE = 0.1", "WIDEST_CENTRE = 0.0"),
         ("max(1.0, excess / stated)", "1.0"),
     ),
     *mutants_of(

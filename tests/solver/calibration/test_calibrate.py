@@ -351,3 +351,26 @@ def test_reduced_priors_count_the_estimate_and_its_error(true):
     found = reduce_priors(replace(PRIORS, centre=1e-3, radius=7e-6), equations, unknowns, draws)
     assert found.centre == pytest.approx(5e-6)
     assert found.radius == 7e-6  # the limit
+
+
+def test_a_centre_that_is_less_certain_may_err_by_more(rng):
+    true = slide_rows(rng)
+    offset = rng.normal(0.0, 10e-6, (true.grain_count, 2))
+    offset[10] = 400e-6, -300e-6
+    measured = add_noise(falsify(true, offset=offset), 2e-6, rng)
+    spread = np.ones(true.grain_count)
+    spread[10] = 40.0
+    alike, apart = (
+        calibrate(each, PRIORS, rng=np.random.default_rng(1)).offset - offset
+        for each in (measured, replace(measured, centre_spread=spread))
+    )
+    assert np.abs(apart[10]).max() < 30e-6 < np.abs(alike[10]).max()
+    others = np.arange(true.grain_count) != 10
+    assert rms(apart[others]) < 6e-6
+
+
+def test_an_expected_spread_is_positive_and_of_every_grain(rng):
+    true = slide_rows(rng, frames=2)
+    for wrong in (np.ones(3), np.zeros(true.grain_count)):
+        with pytest.raises(ValueError, match="centre_spread"):
+            replace(true, centre_spread=wrong)
