@@ -1,4 +1,4 @@
-"""Poses that contradict the photographs beside theirs: rods that jump into others or back, or exchange their names."""
+"""Poses that contradict other photographs: of rods that jump, are misplaced, or have exchanged their names."""
 
 from __future__ import annotations
 
@@ -27,13 +27,14 @@ DEEP = 6.0  # robust standard deviations above the usual overlap, and NOISE of a
 ONE_SIDED = 1.2  # times the least jump, where only photographs on one side show the motion
 PASSES = 8  # an outlier hides the one before or after it until it is interpolated
 MOST = 0.1  # of the poses of a frame: where more jump, the packing rearranges
+MISPLACED = 0.25  # of a radius, and JUMP deviations among the neighbours: a doubtful pose so far from theirs is wrong
 NAMED, LISTED = 6, 4  # rods of one photograph, and photographs, that a sentence lists
 
 
 def remove_outliers(
     tracks: Tracks, walls: WallTracks | None = None, placed: NDArray[np.bool_] | None = None
 ) -> tuple[Tracks, str]:
-    """Take poses of rods that jump for one photograph out of it; they are lost there.
+    """Take out poses that are misplaced, or of rods that jump for one photograph; they are lost there.
 
     Parameters
     ----------
@@ -50,16 +51,28 @@ def remove_outliers(
     remark : str
         How many there were; empty where there is none.
     """
-    outlier = find_outliers(tracks, walls)
-    if placed is not None:
-        outlier &= ~placed
-    count = int(outlier.sum())
+    stays = False if placed is None else placed
+    misplaced = find_misplaced(tracks) & ~np.asarray(stays)
+    tracks = without_poses(tracks, misplaced) if misplaced.any() else tracks
+    outlier = find_outliers(tracks, walls) & ~np.asarray(stays)
+    tracks = without_poses(tracks, outlier) if outlier.any() else tracks
+    remarks = (
+        _describe(
+            misplaced, "is a doubtful match far from its neighbours", "are doubtful matches far from their neighbours"
+        ),
+        _describe(outlier, "jumps against the neighbours", "jump against the neighbours"),
+    )
+    return tracks, "; ".join(filter(None, remarks))
+
+
+def _describe(wrong: NDArray[np.bool_], *reasons: str) -> str:
+    """State how many poses (f, n) count as lost, and why, in the singular and the plural; empty for none."""
+    count, frames = int(wrong.sum()), int(wrong.any(axis=1).sum())
     if not count:
-        return tracks, ""
-    poses, frames = state_count(count, "pose"), state_count(int(outlier.any(axis=1).sum()), "photograph")
-    verbs = ("jumps", "it counts") if count == 1 else ("jump", "they count")
-    remark = f"{poses} in {frames} {verbs[0]} against the neighbours: {verbs[1]} as lost; check these rods"
-    return without_poses(tracks, outlier), remark
+        return ""
+    reason, counts = reasons[count > 1], ("it counts", "they count")[count > 1]
+    poses, photographs = state_count(count, "pose"), state_count(frames, "photograph")
+    return f"{poses} in {photographs} {reason}: {counts} as lost; check these rods"
 
 
 def restore_exchanged_ids(tracks: Tracks) -> tuple[Tracks, str]:
@@ -140,6 +153,32 @@ def find_outliers(tracks: Tracks, walls: WallTracks | None = None) -> NDArray[np
         found |= more
         search.interpolate(found)
         changed = sorted({k for row in rows for k in range(max(row - 2, 0), min(row + 3, frames))})
+    return found
+
+
+def find_misplaced(tracks: Tracks) -> NDArray[np.bool_]:
+    """Find poses (f, n) that the tracker doubts, far from where neighbours and other photographs put them.
+
+    Notes
+    -----
+    A match of little certainty may be on another part of the picture; from then on the rod seems to move with its
+    neighbours again. Its place is expected from the nearest photographs in which it is certain, and from the motion of
+    its neighbours since. Where more than MOST of the poses of a photograph are doubtful, as in a blurred one, all stay.
+    """
+    present = tracks.present
+    doubtful = present & (tracks.status == TrackStatus.SUSPECT)
+    found = np.zeros_like(doubtful)
+    doubtful[doubtful.mean(axis=1) > MOST] = False
+    if tracks.boundary is not None or not doubtful.any():
+        return found
+    certain = np.where((present & ~doubtful)[..., None], tracks.position, np.nan)
+    seen = np.isfinite(certain[..., 0])
+    for k in np.flatnonzero(doubtful.any(axis=1)).tolist():
+        rows = np.flatnonzero(doubtful[k] & seen.any(axis=0))
+        if len(rows) and seen[k].sum() > NEIGHBOURS:
+            expected = interpolate_poses(tracks.time, certain, k, rows)
+            distance = np.linalg.norm(tracks.position[k, rows] - expected.place, axis=1)
+            found[k, rows] = distance > np.maximum(MISPLACED * tracks.radius[rows], JUMP * expected.sd)
     return found
 
 

@@ -4,7 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.inference.correction.outliers import find_outliers, remove_outliers, restore_exchanged_ids
+from rodsight.inference.correction.outliers import (
+    find_misplaced,
+    find_outliers,
+    remove_outliers,
+    restore_exchanged_ids,
+)
 from rodsight.solver.bodies.wall_shapes import IN, circle_ends
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
@@ -211,3 +216,30 @@ def test_every_photograph_with_confused_names_is_listed_up_to_a_few():
     words = restore_exchanged_ids(tracks.rearranged(row))[1]
     assert words.count("photograph") == 4
     assert words.endswith("; …")
+
+
+def doubted(tracks: Tracks, *poses) -> Tracks:
+    status = tracks.status.copy()
+    for frame, rod in poses:
+        status[frame, rod] = TrackStatus.SUSPECT
+    return replace(tracks, status=status)
+
+
+@pytest.mark.parametrize("frames", [range(2, 4), range(3, FRAMES), range(2)])
+def test_doubtful_poses_far_from_their_neighbours_count_as_lost(frames):
+    far = [(k, ROD, (0.006, 0.004)) for k in frames]
+    tracks = doubted(sheared_tracks(far), *((k, ROD) for k in frames), (4, 3))
+    found, remark = remove_outliers(tracks)
+    assert np.argwhere(found.lost).tolist() == [[k, ROD] for k in frames]
+    assert remark.startswith(f"{len(frames)} poses in {len(frames)} photographs are doubtful matches far from")
+    stays = np.zeros((FRAMES, N), np.bool_)
+    stays[:, ROD] = True  # placed by hand
+    assert remove_outliers(tracks, placed=stays)[0] is tracks
+
+
+def test_doubtful_poses_stay_where_most_are_or_where_nothing_is_certain():
+    far = [(k, ROD, (0.006, 0.004)) for k in range(FRAMES)]
+    always = doubted(sheared_tracks(far), *((k, ROD) for k in range(FRAMES)))
+    assert not find_misplaced(always).any()
+    blurred = doubted(sheared_tracks(far[2:3]), *((2, rod) for rod in {ROD, *range(N // 5)}))
+    assert not find_misplaced(blurred).any()

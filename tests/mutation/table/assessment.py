@@ -118,6 +118,13 @@ MUTANTS = [
     *mutants_of(
         "app/inference/correction/outliers.py",
         OUTLIERS,
+        ("doubtful[doubtful.mean(axis=1) > MOST] = False", "pass"),
+        ("MISPLACED = 0.25", "MISPLACED = 2.5"),
+        ("certain = np.where((present & ~doubtful)[..., None]", "certain = np.where(present[..., None]"),
+    ),
+    *mutants_of(
+        "app/inference/correction/outliers.py",
+        OUTLIERS,
         ("2.0 * position[k - 1] - position[k - 2]", "position[k - 1]"),
         ("< 2.0 * RETURN * deviation", "< np.inf"),
         ("JUMP = 6.0", "JUMP = 80.0"),
