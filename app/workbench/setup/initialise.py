@@ -160,19 +160,24 @@ def _pixel_size(flags: SetupFlags) -> float:
 def _choose_views(
     photographs: Photographs, flags: SetupFlags, selection: ImageSelection
 ) -> tuple[list[View], list[str]]:
-    """Order channels, and light or dark discs, by how much of the rods' outlines is seen; also a sentence on them."""
+    """Order channels, and light or dark discs, by how much of the rods' outlines is seen; also a sentence on them.
+
+    With known radii the picture is first taken as it is, which most often shows all rods.
+    """
     plain = View(selection.channel, False, 0, 0.0, None)
-    if flags.radii or flags.follow == "texture":
+    if flags.follow == "texture" and not flags.radii:
         return [plain], []
     channels = {name: selection.cut(image) for name, image in photographs.in_channels(0).items()}
     if flags.channel is not None:
         channels = dict.fromkeys(channels, channels[flags.channel])  # not coloured: light and dark discs are compared
-    views = compare_views(channels, DetectionSettings((), flags.radius_range))
+    radii = tuple(radius / _pixel_size(flags) for radius in flags.radii)
+    views = compare_views(channels, DetectionSettings(radii, flags.radius_range))
     if flags.channel is not None:
         views = [replace(view, channel=flags.channel) for view in views]
     if views[0].count == 0:
         return [plain], []
-    return views, ["A small copy of the first photograph shows " + ", ".join(v.describe() for v in views[:4]) + "."]
+    shown = ["A small copy of the first photograph shows " + ", ".join(v.describe() for v in views[:4]) + "."]
+    return ([replace(plain, count=views[0].count), *views] if flags.radii else views), shown
 
 
 def _detect(
@@ -197,9 +202,8 @@ def _detect(
             break
     view, detection = max(tried, key=lambda each: float(each[1].quality @ each[1].radius))
     if detection.count == 0:
-        raise InputError(
-            validated.files[0], "", "no rods were found; give their --radii, or mark them by rodsight open"
-        )
+        cure = "check --radii and --pixel-size" if flags.radii else "give their --radii"
+        raise InputError(validated.files[0], "", f"no rods were found; {cure}, or mark them by rodsight open")
     return view, detection, []
 
 

@@ -72,8 +72,8 @@ def test_flags_make_an_experiment_and_a_picture(folder, made_photographs):
     assert colourful.mean() > 0.01
 
 
-def discs(folder, columns: int = 6, rows: int = 5, radius: float = 24.0) -> None:
-    """Three photographs of discs that stand out in the red channel only, in a hexagonal packing."""
+def discs(folder, columns: int = 6, rows: int = 5, radius: float = 24.0, green: float = 0.0) -> None:
+    """Three photographs of discs that stand out in the red channel, and by so much in green, in a hexagonal packing."""
     y, x = np.mgrid[: int(2 * radius * rows + 40), : int(2 * radius * (columns + 1) + 40)]
     red = np.full(x.shape, 40.0)
     for row in range(rows):
@@ -81,12 +81,21 @@ def discs(folder, columns: int = 6, rows: int = 5, radius: float = 24.0) -> None
             at = 20 + radius * (1 + 2 * column + row % 2), 20 + radius * (1 + row * np.sqrt(3.0))
             depth = radius - 1.5 - np.hypot(x - at[0], y - at[1])
             red = np.maximum(red, 40.0 + 160.0 * np.clip(depth + 0.5, 0.0, 1.0))
-    picture = np.stack([np.full(x.shape, 90.0), np.full(x.shape, 90.0), red], axis=2)
+    picture = np.stack([np.full(x.shape, 90.0), 90.0 + green * (red - 40.0) / 160.0, red], axis=2)
     rng = np.random.default_rng(0)
     (folder / "shots").mkdir(parents=True)
     for k in range(3):
         noise = rng.normal(0.0, 2.0, picture.shape)
         cv2.imwrite(str(folder / f"shots/{k}.png"), np.clip(picture + noise, 0, 255).astype(np.uint8))
+
+
+@pytest.mark.thorough
+def test_the_channel_that_shows_the_rods_is_found_with_known_radii_too(tmp_path):
+    discs(tmp_path, green=-160.0 * 0.299 / 0.587)  # as light in grey as their surroundings
+    flags = ("--photographs", "shots/*.png", "--interval", 5, "--pixel-size", 1e-4, "--walls", "none", "--quiet")
+    assert rodsight("init", tmp_path, *flags, "--radii", 0.0024) == 0
+    assert load_experiment(tmp_path).config.photographs.channel == "red"
+    assert len((tmp_path / "grains.csv").read_text().splitlines()) - 1 == 30
 
 
 @pytest.mark.thorough
