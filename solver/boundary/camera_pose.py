@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..bodies.grains import Array
 from ..calibration.gaps import GapRows, MeasuredSequence, find_gap_rows, measure_gaps
 from ..quantity import Quantity
+from .picture_shifts import find_picture_shifts
 
 REACH = 0.1  # mean radii: greatest gap of pairs that may bear on the wall, in more than half of all frames
 FARTHEST = 1.0  # mean radii: greatest gap of these pairs in the others, where the camera may be displaced
@@ -28,7 +29,10 @@ MIN_EVIDENCE = 6.0  # mean square of the poses over their variance above which t
 
 @dataclass(frozen=True, slots=True)
 class CameraPose:
-    """Pose of the camera in every frame relative to its median; if applied, positions were corrected by it."""
+    """Pose of the camera in every frame; if applied, positions were corrected by it.
+
+    It is relative to the walls where it is large, else to its median over the photographs.
+    """
 
     shift: Annotated[Array, Quantity("shift of the picture relative to the walls", "m", "frame xy", since=2)]
     rotation: Annotated[
@@ -74,15 +78,21 @@ def find_camera_pose(sequence: MeasuredSequence) -> CameraPose:
     In frame k, the gap of pair p at a wall of outward normal n is g = ḡ_p − n·(t_k + φ_k ẑ × r + λ_k r) + noise, with r
     the rod's position from the mean of all and ḡ_p the pair's usual gap. Poses minimise Σ W(e/(3 s)) e²/σ² plus their
     Gaussian priors in twelve rounds, with e the residual, W(u) = (1 + u²)⁻², ḡ_p the median of the pair, and s
-    shrinking from the prior to the noise; their median over the photographs is zero. They are applied if the mean of
-    pose²/variance exceeds 6.
+    shrinking from the prior to the noise. The priors are about the coarse shifts of `find_picture_shifts`, zero without
+    large ones, and the median of the poses over the photographs is that of the coarse shifts. They are applied if the
+    mean of pose²/variance exceeds 6.
     """
-    radius = float(sequence.radius.mean())
-    rows = _wall_rows(sequence, REACH * radius)
-    seen = sequence.present.any(axis=1)
+    radius, seen = float(sequence.radius.mean()), sequence.present.any(axis=1)
+    # A photograph that is displaced opens the gaps at one wall and closes those at the opposite one: without the open
+    # ones its displacement would seem smaller.
+    rows = find_gap_rows(sequence, -np.inf, wall_reach=FARTHEST * radius)
+    geometry = measure_gaps(rows, sequence.position, sequence.endpoints, sequence.radius, sequence.side)
+    start = find_picture_shifts(rows, geometry, seen, radius)
+    bears = geometry.gap + np.einsum("mk,mk->m", geometry.normal, start[rows.frame]) < REACH * radius
+    often = np.bincount(rows.pair[bears], minlength=int(rows.pair.max(initial=-1)) + 1) > 0.5 * seen.sum()
+    rows, geometry = rows.select(often[rows.pair]), geometry.select(often[rows.pair])
     if rows.count == 0 or np.bincount(rows.frame, minlength=sequence.frame_count)[seen].min() < MIN_PAIRS:
         return CameraPose.unknown(sequence.frame_count)
-    geometry = measure_gaps(rows, sequence.position, sequence.endpoints, sequence.radius, sequence.side)
     at = sequence.position[rows.frame, rows.i]
     centre = at.mean(axis=0)
     place = at - centre
@@ -94,7 +104,7 @@ def find_camera_pose(sequence: MeasuredSequence) -> CameraPose:
         np.einsum("mk,mk->m", normal, place) / reach,
     ])  # fmt: skip
     noise = np.maximum(sequence.sigma[rows.frame, rows.i], MIN_NOISE * radius)
-    pose, variance = _fit(rows, geometry.gap, derivative, noise, PRIOR * radius, sequence.frame_count)
+    pose, variance = _fit(rows, geometry.gap, derivative, noise, PRIOR * radius, start)
     evidence = float(np.mean((pose**2 / variance)[seen]))
     applied = evidence > MIN_EVIDENCE
     shown = pose if applied else np.zeros_like(pose)
@@ -103,21 +113,14 @@ def find_camera_pose(sequence: MeasuredSequence) -> CameraPose:
     )
 
 
-def _wall_rows(sequence: MeasuredSequence, reach: float) -> GapRows:
-    """List the gaps to walls, in all frames, of pairs within reach [m] in more than half of these.
+def _fit(rows: GapRows, gap: Array, derivative: Array, noise: Array, prior: float, shift: Array) -> tuple[Array, Array]:
+    """Fit poses (f, 4) [m] and their variances by re-weighted least squares, in turn with the pairs' median gaps.
 
-    A photograph that is displaced opens the gaps at one wall and closes those at the opposite one: without the open
-    ones its displacement would seem smaller.
+    The pose begins with the coarse shift (f, 2) [m] of each picture.
     """
-    rows = find_gap_rows(sequence, -np.inf, wall_reach=FARTHEST / REACH * reach)
-    gap = measure_gaps(rows, sequence.position, sequence.endpoints, sequence.radius, sequence.side).gap
-    near = np.bincount(rows.pair[gap < reach], minlength=int(rows.pair.max(initial=-1)) + 1)
-    return rows.select((near > 0.5 * sequence.present.any(axis=1).sum())[rows.pair])
-
-
-def _fit(rows: GapRows, gap: Array, derivative: Array, noise: Array, prior: float, frames: int) -> tuple[Array, Array]:
-    """Fit poses (f, 4) [m] and their variances by re-weighted least squares, in turn with the pairs' median gaps."""
-    pose, variance = np.zeros((frames, 4)), np.full((frames, 4), prior**2)
+    frames = len(shift)
+    start, variance = np.column_stack([shift, np.zeros_like(shift)]), np.full((frames, 4), prior**2)
+    pose = start.copy()
     order = np.argsort(rows.frame, kind="stable")
     ends = np.searchsorted(rows.frame[order], np.arange(frames + 1))
     scale = np.maximum(noise, prior)
@@ -131,12 +134,12 @@ def _fit(rows: GapRows, gap: Array, derivative: Array, noise: Array, prior: floa
             d, w = derivative[at], weight[at]
             normal = d.T @ (w[:, None] * d) + np.eye(4) / prior**2
             inverse = np.linalg.inv(normal)
-            step = inverse @ (d.T @ (w * left[at]) - pose[k] / prior**2)
+            step = inverse @ (d.T @ (w * left[at]) - (pose[k] - start[k]) / prior**2)
             pose[k] += step
             variance[k] = np.diag(inverse)
         fitted = np.diff(ends) > 0
         # A common pose would be an error of the walls; the mean would hold part of a single displacement.
-        pose[fitted] -= np.median(pose[fitted], axis=0)
+        pose[fitted] -= np.median((pose - start)[fitted], axis=0)
     return pose, variance
 
 

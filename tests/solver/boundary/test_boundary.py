@@ -10,7 +10,8 @@ from rodsight.solver.boundary.bars import find_wall_bars
 from rodsight.solver.boundary.boundary_correction import BoundarySettings, correct_boundary
 from rodsight.solver.boundary.camera_pose import find_camera_pose
 from rodsight.solver.boundary.continuation import continue_walls, extend_walls
-from rodsight.solver.calibration.gaps import MeasuredSequence
+from rodsight.solver.boundary.picture_shifts import find_picture_shifts
+from rodsight.solver.calibration.gaps import MeasuredSequence, find_gap_rows, measure_gaps
 
 pytestmark = pytest.mark.unit
 
@@ -198,6 +199,45 @@ def test_one_displaced_photograph_is_found_and_the_others_stay(size) -> None:
     assert found.applied
     assert found.shift[3] == pytest.approx(displacement, abs=3e-5)
     assert np.abs(np.delete(found.shift, 3, axis=0)).max() < 3e-5
+
+
+@pytest.mark.parametrize("size", [0.3, 0.7])  # radii
+def test_a_camera_displaced_for_half_of_the_photographs_is_found_against_the_walls(size) -> None:
+    sequence, _ = sheared_box()
+    displacement = size * RADIUS * np.array([0.8, -0.6])
+    sequence.position[FRAMES // 2 :] += displacement
+    found = find_camera_pose(sequence)
+    assert found.applied
+    assert found.shift[: FRAMES // 2] == pytest.approx(np.zeros((FRAMES // 2, 2)), abs=4e-5)
+    assert found.shift[FRAMES // 2 :] == pytest.approx(np.tile(displacement, (FRAMES - FRAMES // 2, 1)), abs=4e-5)
+
+
+def test_a_camera_that_drifts_is_found_against_the_walls() -> None:
+    sequence, _ = sheared_box()
+    drift = np.linspace(0.0, 0.6 * RADIUS, FRAMES)[:, None] * np.array([0.6, 0.8])
+    sequence.position[:] += drift[:, None]
+    assert find_camera_pose(sequence).shift == pytest.approx(drift, abs=4e-5)
+
+
+def picture_shifts(sequence: MeasuredSequence) -> np.ndarray:
+    rows = find_gap_rows(sequence, -np.inf, wall_reach=RADIUS)
+    geometry = measure_gaps(rows, sequence.position, sequence.endpoints, sequence.radius)
+    return find_picture_shifts(rows, geometry, np.ones(FRAMES, np.bool_), RADIUS)
+
+
+@pytest.mark.parametrize("outward", [0.4, -0.4])  # radii
+def test_one_misplaced_wall_is_no_displacement_of_the_camera(outward) -> None:
+    sequence, _ = sheared_box()
+    endpoints = sequence.endpoints.copy()
+    endpoints[FRAMES // 2 :, 1, :, 0] += outward * RADIUS
+    assert not picture_shifts(replace(sequence, endpoints=endpoints)).any()
+
+
+def test_the_shift_of_a_picture_needs_walls_of_two_directions() -> None:
+    sequence, _ = sheared_box()
+    moved = replace(sequence, position=sequence.position + 0.4 * RADIUS)
+    assert picture_shifts(moved) == pytest.approx(np.full((FRAMES, 2), 0.4 * RADIUS), abs=2e-5)
+    assert not picture_shifts(replace(moved, endpoints=moved.endpoints[:, [0]])).any()
 
 
 def test_too_few_rods_at_the_walls_give_no_pose() -> None:
