@@ -28,11 +28,8 @@ from ...solver.bodies.wall_shapes import STRAIGHT
 from ...tracking.detection.channels import View, compare_views
 from ...tracking.detection.detect import Detection, DetectionSettings, refine_grains
 from ...tracking.outline.missing_discs import add_missing_discs
-from ...tracking.outline.outline_tracker import OutlineTracker
-from ...tracking.settings import TrackingSettings
-from ...tracking.tracker import Tracker
+from ...tracking.outline.texture_or_outline import prefer_outlines
 from ...tracking.walls.plain_bars import can_be_followed
-from ...tracks import TrackStatus
 from . import circles, edits
 from .draft import Draft
 from .experiment_folders import valid_name
@@ -40,9 +37,7 @@ from .setup_picture import draw_setup
 from .validation import ValidationResult, first_tracks, validate
 
 PICTURE = "understood.png"
-SURE = (TrackStatus.OK, TrackStatus.RESCUED, TrackStatus.ROBUST)
 MOST_VIEWS, KEPT = 3, 0.8  # of a photograph that are tried; fraction of the discs of the small copy
-BETTER_FOLLOWED = 1.2  # ratio of rods that are followed by their outlines to those by their texture
 ASSUMED_INTERVAL = 1.0  # s
 FOUND, NONE = "auto", "none"
 
@@ -241,17 +236,8 @@ def _choose_follow(
     if len(photographs) < 2 or rods is None:
         return None, []
     images = [selection.cut(read_photograph(file, channel=selection.channel)) for file in photographs.files[:2]]
-    detection = refine_grains(images[0], rods.x, rods.y, rods.radius)
-    counts = {
-        "texture": _count_followed(Tracker(images[0], detection, TrackingSettings("texture")), images[1]),
-        "outline": _count_followed(OutlineTracker(images[0], detection, TrackingSettings("outline")), images[1]),
-    }
-    if counts["outline"] <= max(BETTER_FOLLOWED * counts["texture"], counts["texture"] + 2):
-        return None, []
-    return "outline", [
-        f"By their outlines {counts['outline']} of {len(rods.x)} rods are followed to the second photograph, by their "
-        f'texture {counts["texture"]}: follow = "outline".'
-    ]
+    reason = prefer_outlines(images[0], images[1], refine_grains(images[0], rods.x, rods.y, rods.radius))
+    return ("outline", [reason]) if reason else (None, [])
 
 
 def _replace_plain_bars(
@@ -281,10 +267,6 @@ def _impose_outer_rods(draft: Draft, found: ValidationResult) -> str:
     edits.set_walls(draft, found, [], "no walls")
     draft.set_keys("boundary", {"boundary.grains": "outer"})
     return 'the motion of the outermost rods is imposed instead ([boundary] grains = "outer").'
-
-
-def _count_followed(tracker: Tracker | OutlineTracker, image: Image) -> int:
-    return int(np.isin(tracker.follow(image, [tracker.first()]).status, SURE).sum())
 
 
 def _first(photographs: Photographs, selection: ImageSelection) -> Image:
