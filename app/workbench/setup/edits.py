@@ -39,6 +39,9 @@ GRAINS, WALLS, CORRECTIONS = "grains.csv", "walls.csv", "corrections.csv"
 GRAIN_COLUMNS = ("id", "x", "y", "radius")
 OVERLAP = 0.15  # [radii] that a rod added by hand may overlap others: clicks and fits have errors
 TOUCHES = 0.08  # radii between the edge of a bar and the rod next to it; else it is another edge
+# Radii form classes where so many, from so many rods on, are within so much of one of so few classes.
+NEARLY_ALL, FEWEST_EVIDENT, EVIDENT, MOST_EVIDENT = 0.85, 20, 0.015, 5
+RARE = 0.08  # fraction of the rods that no class has
 SEEN = 0.34  # fraction of the profiles across a line that must show the edge
 NAMES = ("bottom", "right", "top", "left")
 # Densities [kg/m³] and textbook friction coefficients of dry, clean rods: initial values.
@@ -350,6 +353,17 @@ def find_classes(radius: Array, most: int = 8) -> Array:
     parts = np.split(ordered, np.flatnonzero(gap > np.maximum(0.035 * ordered[1:], 3.0 * np.median(gap))) + 1)
     large = sorted((each for each in parts if len(each) >= max(2, 0.01 * len(ordered))), key=len)[-most:]
     return np.sort(np.array([np.median(each) for each in large or [ordered]]))
+
+
+def evident_classes(radius: Array) -> Array | None:
+    """Find radius classes (k,) that nearly all radii (n,) share; None where there are none, as in a continuous law."""
+    classes = find_classes(radius)
+    near = np.abs(radius[:, None] / classes - 1.0) < EVIDENT
+    classes = classes[near.mean(axis=0) > RARE]
+    if not 0 < len(classes) <= MOST_EVIDENT or len(radius) < FEWEST_EVIDENT:
+        return None
+    off = np.abs(radius[:, None] / classes - 1.0).min(axis=1)
+    return classes if np.mean(off < EVIDENT) >= NEARLY_ALL and np.median(off) < 0.25 * EVIDENT else None
 
 
 def _within_walls(detection: Detection, found: ValidationResult) -> Detection:

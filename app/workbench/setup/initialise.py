@@ -38,6 +38,7 @@ from .validation import ValidationResult, first_tracks, validate
 
 PICTURE = "understood.png"
 MOST_VIEWS, KEPT = 3, 0.8  # of a photograph that are tried; fraction of the discs of the small copy
+KEPT_IN_CLASSES = 0.98  # of the rods must be found again with the sizes that nearly all have
 ASSUMED_INTERVAL = 1.0  # s
 FOUND, NONE = "auto", "none"
 
@@ -119,6 +120,7 @@ def _initialise(folder: Path, draft: Draft, flags: SetupFlags, video: list[str])
         view, detection, left_out = _detect(draft, flags, photographs, selection, views)
         selection = replace(selection, channel=view.channel)  # type: ignore[arg-type]
         first = selection.cut(_first(photographs, selection))
+        detection, classes = _in_classes(first, view, detection, flags, _without_errors(draft, "photographs", "scale"))
         found, notes = _find_rods_and_walls(draft, flags, first, detection)
         follow, how = _choose_follow(photographs, flags, selection, view, found)
         keys = {"photographs.channel": view.channel if view.channel != "grey" else None, "photographs.follow": follow}
@@ -126,7 +128,7 @@ def _initialise(folder: Path, draft: Draft, flags: SetupFlags, video: list[str])
         found = _without_errors(draft, "photographs")
         plain = _replace_plain_bars(draft, flags, photographs, selection, found)
         found = _without_errors(draft, "photographs")
-        notes = [*video, *left_out, *remarks, *how, *notes, *plain]
+        notes = [*video, *left_out, *remarks, *classes, *how, *notes, *plain]
         write_atomically(folder / PICTURE, draw_setup(_first(photographs, selection), found))
     for note in notes:
         found.steps["walls"].add_warning(note)
@@ -200,6 +202,25 @@ def _detect(
         cure = "check --radii and --pixel-size" if flags.radii else "give their --radii"
         raise InputError(validated.files[0], "", f"no rods were found; {cure}, or mark them by rodsight open")
     return view, detection, []
+
+
+def _in_classes(
+    first: Image, view: View, detection: Detection, flags: SetupFlags, found: ValidationResult
+) -> tuple[Detection, list[str]]:
+    """Detect rods of a few sizes once more with these sizes; also a sentence on them.
+
+    A rim that glare or paint interrupts is then found at its place, and not as a smaller circle beside it.
+    """
+    sizes = None if flags.radii or flags.grains is not None else edits.evident_classes(detection.radius)
+    if sizes is None or found.scale is None:
+        return detection, []
+    lit = np.float32(FULL_SCALE) - first if view.dark else first
+    again = edits.detect(lit, found, (sizes * found.scale.mean_size).tolist())
+    if again.count < KEPT_IN_CLASSES * detection.count:
+        return detection, []
+    listed = ", ".join(f"{1e3 * size * found.scale.mean_size:.4g}" for size in sizes)
+    many = f"{len(sizes)} sizes" if len(sizes) > 1 else "one size"
+    return again, [f"The rods have {many}, radius {listed} mm in the photograph: all are set to it. Better: --radii."]
 
 
 def _without_video(folder: Path, flags: SetupFlags, on_failure: ExitStack) -> tuple[SetupFlags, list[str]]:

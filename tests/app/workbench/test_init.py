@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment, read_grain_guess
+from rodsight.workbench.setup import edits
 
 from tests.program import rodsight
 
@@ -247,3 +248,36 @@ def test_a_failure_leaves_no_frames_of_a_video(tmp_path, capsys):
     assert rodsight("init", tmp_path, *flags) == 2
     assert "none.yml: there is no such file" in capsys.readouterr().err
     assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("sizes", "scatter", "odd", "expected"),
+    [
+        ((20.0, 30.0), 0.02, 4, [20.0, 30.0]),
+        ((25.0,), 0.02, 4, [25.0]),
+        ((20.0, 30.0), 0.02, 12, None),  # too many of no size
+        ((20.0, 30.0), 0.4, 0, None),  # readings that scatter by more than the sizes are known
+    ],
+)
+def test_sizes_that_nearly_all_rods_have_are_evident(sizes, scatter, odd, expected):
+    rng = np.random.default_rng(4)
+    radius = np.repeat(sizes, 60 // len(sizes)) + rng.normal(0.0, scatter, 60)
+    radius[:odd] *= np.linspace(0.75, 0.95, odd)
+    found = edits.evident_classes(radius)
+    assert (None if found is None else [round(each, 1) for each in found.tolist()]) == expected
+
+
+def test_a_continuous_law_of_radii_and_few_rods_have_no_evident_sizes():
+    assert edits.evident_classes(np.linspace(20.0, 30.0, 60)) is None
+    assert edits.evident_classes(np.full(10, 20.0)) is None
+
+
+@pytest.mark.thorough
+def test_rods_of_one_size_all_have_it(tmp_path, capsys):
+    discs(tmp_path)
+    flags = ("--photographs", "shots/*.png", "--interval", 5, "--pixel-size", 1e-4, "--walls", "none")
+    assert rodsight("init", tmp_path, *flags) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "The rods have one size, radius 2.251 mm in the photograph" in said
+    rows = (tmp_path / "grains.csv").read_text().splitlines()[1:]
+    assert len({row.split(",")[3] for row in rows}) == 1
