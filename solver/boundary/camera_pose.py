@@ -82,7 +82,7 @@ def find_camera_pose(sequence: MeasuredSequence) -> CameraPose:
     large ones, and the median of the poses over the photographs is that of the coarse shifts. They are applied if the
     mean of pose²/variance exceeds 6.
     """
-    radius, seen = float(sequence.radius.mean()), sequence.present.any(axis=1)
+    radius, seen = float(sequence.radius.mean()), np.any(sequence.present, axis=1)
     # A photograph that is displaced opens the gaps at one wall and closes those at the opposite one: without the open
     # ones its displacement would seem smaller.
     rows = find_gap_rows(sequence, -np.inf, wall_reach=FARTHEST * radius)

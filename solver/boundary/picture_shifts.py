@@ -77,6 +77,6 @@ def _shift_of(normal: Array, gap: Array, radius: float) -> Array | None:
     """Shift (2,) [m] that moves the rods against walls of these normals (w, 2) and gaps (w,); None: not known."""
     if len(gap) < 2 or np.linalg.svd(normal, compute_uv=False)[-1] < STABLE:
         return None
-    shift = np.linalg.lstsq(normal, -gap, rcond=None)[0]
+    shift: Array = np.linalg.lstsq(normal, -gap, rcond=None)[0].astype(np.float64)
     left = np.abs(normal @ shift + gap).max()
     return shift if left <= CONSISTENT * np.linalg.norm(shift) + LEAST * radius else None

@@ -29,7 +29,7 @@ from ...tracking.detection.channels import View, compare_views
 from ...tracking.detection.clicked_circle import compare_rims
 from ...tracking.detection.detect import Detection, DetectionSettings, refine_grains
 from ...tracking.outline.missing_discs import add_missing_discs
-from ...tracking.outline.texture_or_outline import prefer_outlines
+from ...tracking.texture_or_outline import prefer_outlines
 from ...tracking.walls.plain_bars import can_be_followed
 from . import circles, edits
 from .draft import Draft

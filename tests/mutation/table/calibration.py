@@ -88,7 +88,6 @@ MUTANTS = [
         "tests/solver/calibration/test_calibrate.py",
         ("+ np.mean(drawn**2)", ""),
         ("np.repeat(_centre_prior(equations.sequence, priors), 2)", "priors.centre"),
-        ("near = gap < REACH * start + REACH_OF_NOISE * noise", "near = gap < 0.0"),
         ("WIDEST_CENTRE = 0.1", "WIDEST_CENTRE = 0.0"),
         ("max(1.0, excess / stated)", "1.0"),
     ),
@@ -117,6 +116,12 @@ MUTANTS = [
             "column[:, 0], column[:, 2] = of_class[i], of_class[grain]",
             "column[:, 0], column[:, 2] = of_class[grain], of_class[grain]",
         ),
+    ),
+    *mutants_of(
+        "app/tracking/texture_or_outline.py",
+        "tests/app/tracking/test_texture_or_outline.py",
+        ("texture.deviation > BETTER_AGREEMENT * outline.deviation", "texture.deviation > np.inf"),
+        ("BETTER_AGREEMENT = 1.5", "BETTER_AGREEMENT = 0.5"),
     ),
     *mutants_of(
         "solver/boundary/picture_shifts.py",

@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...experiment.pictures.image import Image
-from ...tracks import TrackStatus
-from ..detection.detect import Detection
-from ..registration.neighbours import local_motion
-from ..settings import TrackingSettings
-from ..tracker import Tracker
-from .outline_tracker import OutlineTracker
+from ..experiment.pictures.image import Image
+from ..tracks import TrackStatus
+from .detection.detect import Detection
+from .outline.outline_tracker import OutlineTracker
+from .registration.neighbours import local_motion
+from .settings import TrackingSettings
+from .tracker import Tracker
 
 SURE = (TrackStatus.OK, TrackStatus.RESCUED, TrackStatus.ROBUST)
 BETTER_FOLLOWED = 1.2  # ratio of rods that are followed by their outlines to those by their texture
@@ -25,24 +25,24 @@ BETTER_AGREEMENT = 1.5
 class _Followed(NamedTuple):
     """Rods that are found in the second photograph, and how far their motions differ from those beside them."""
 
-    count: int
+    rods: int
     deviation: float  # [px] median; inf with too few rods
 
 
-def prefer_outlines(first: Image, second: Image, rods: Detection) -> str:
+def prefer_outlines(first: Image, second: Image, detection: Detection) -> str:
     """Return why the rods should be followed by their outlines, as a sentence; empty: by their texture.
 
     A small mark leaves the place of a rod open to a rotation about it, although its picture is found again exactly: the
     rods then seem to move more against their neighbours than by their outlines.
     """
-    texture = _follow(Tracker(first, rods, TrackingSettings("texture")), second)
-    outline = _follow(OutlineTracker(first, rods, TrackingSettings("outline")), second)
-    if outline.count > max(BETTER_FOLLOWED * texture.count, texture.count + 2):
+    texture = _follow(Tracker(first, detection, TrackingSettings("texture")), second)
+    outline = _follow(OutlineTracker(first, detection, TrackingSettings("outline")), second)
+    if outline.rods > max(BETTER_FOLLOWED * texture.rods, texture.rods + 2):
         return (
-            f"By their outlines {outline.count} of {rods.count} rods are followed to the second photograph, by their "
-            f'texture {texture.count}: follow = "outline".'
+            f"By their outlines {outline.rods} of {detection.count} rods are followed to the second photograph, by "
+            f'their texture {texture.rods}: follow = "outline".'
         )
-    if outline.count >= AS_MANY * texture.count and texture.deviation > BETTER_AGREEMENT * outline.deviation:
+    if outline.rods >= AS_MANY * texture.rods and texture.deviation > BETTER_AGREEMENT * outline.deviation:
         return (
             "By their texture rods move against their neighbours by "
             f"{texture.deviation:.2g} px to the second photograph, by their outlines by {outline.deviation:.2g} px: "

@@ -7,14 +7,17 @@ import numpy as np
 import pytest
 from rodsight.solver.bodies.grains import Array
 from rodsight.tracking.detection.detect import refine_grains
-from rodsight.tracking.outline.texture_or_outline import prefer_outlines
+from rodsight.tracking.texture_or_outline import prefer_outlines
 
 from tests.app.tracking.outline.discs import WHITE, photograph_discs
 from tests.app.tracking.speckled import grid_of_rods
 
 RODS = grid_of_rods(7, 6, radius=18.0, pitch=37.0, margin=40.0)
-MOVE_X, MOVE_Y = 1.7 + 0.01 * RODS.y, -0.6 + 0.004 * RODS.x  # [px]
-TURN = np.random.default_rng(5).normal(0.0, 0.05, RODS.count)  # [rad]
+RNG = np.random.default_rng(5)
+TURN = RNG.normal(0.0, 0.05, RODS.count)  # [rad]
+# [px], with what rods really move against their neighbours
+MOVE_X = 1.7 + 0.01 * RODS.y + RNG.normal(0.0, 0.12, RODS.count)
+MOVE_Y = -0.6 + 0.004 * RODS.x + RNG.normal(0.0, 0.12, RODS.count)
 
 
 def with_one_dot(x: Array, y: Array, rotation: Array, seed: int) -> np.ndarray:
