@@ -20,6 +20,8 @@ from .experiment import Experiment, rows_of
 from .reading.tables import Table, check_unique
 
 SIDES = ("at the top", "at the bottom", "at the right", "at the left")
+# Rods are sought in the first photograph alone.
+HIDDEN = "; if the first photograph hides rods there, as a hand before them does, begin with a later one: --frames 1:"
 FACING_UP = 0.1  # a surface with a larger cosine to the direction opposite to gravity may be free
 FEWEST_BARE = 4  # unbounded gaps between outer grains: fewer are a missing rod beside a wall
 WIDEST = 2.0  # largest diameters: a cell must be higher, so that a pair touches in at most one of its images
@@ -76,7 +78,8 @@ def free_surfaces(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> 
     side = np.argmax(surface.outward @ np.array([[0.0, 0.0, 1.0, -1.0], [1.0, -1.0, 0.0, 0.0]]), axis=1)
     place = np.where(surface.inner, len(SIDES), side)
     sentences = []
-    for k, name in enumerate((*SIDES, "around a hole inside")):
+    hidden = "" if experiment.config.photographs is None else HIDDEN
+    for k, (name, more) in enumerate((*((side, "") for side in SIDES), ("around a hole inside", hidden))):
         here = bare & (place == k)
         if np.count_nonzero(here) < FEWEST_BARE:
             continue
@@ -84,7 +87,7 @@ def free_surfaces(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> 
         sentences.append(
             f"The packing has a free surface {name}, near x = {x:.3g} m, y = {y:.3g} m, with neither wall nor boundary "
             "there: if something holds these rods, give it by [walls], or impose their measured motion by "
-            '[boundary] grains = "outer"'
+            f'[boundary] grains = "outer"{more}'
         )
     return sentences
 

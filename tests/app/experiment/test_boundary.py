@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rodsight.experiment.boundary import apply_boundary, free_surfaces
+from rodsight.experiment.config.input_sections import PhotographsSection
 from rodsight.experiment.experiment import load_experiment, read_tracks
 from rodsight.experiment.walls import read_walls
 from rodsight.solver.bodies.cell import Cell
@@ -123,6 +125,18 @@ def test_an_open_boundary_is_reported_with_its_place_and_cure(tmp_path):
     assert any("around a hole inside" in each for each in warnings)
     assert any("at the left" in each for each in warnings)
     assert all('[boundary] grains = "outer"' in each for each in warnings)
+    assert not any("photograph" in each for each in warnings)  # these are tracks
+
+
+def test_a_hole_may_be_of_rods_that_the_first_photograph_hides(tmp_path):
+    place = hexagonal(0.05, 0.16)
+    walls = floor(-0.2, 0.2, float(place[:, 1].min()) - R)
+    experiment, *bounds = bound(write(tmp_path, place, '[walls]\nfile = "walls.csv"', walls=walls))
+    photographs = PhotographsSection.model_validate({"files": "*.png", "interval": 1.0, "pixel_size": 1e-4})
+    config = experiment.config.model_copy(update={"photographs": photographs})
+    said = free_surfaces(replace(experiment, config=config), *bounds)
+    assert [each.endswith("--frames 1:") for each in said] == ["hole inside" in each for each in said]
+    assert any("hole inside" in each for each in said)
 
 
 @pytest.mark.thorough
