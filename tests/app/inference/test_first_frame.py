@@ -83,11 +83,14 @@ def test_nothing_is_estimated_without_positions_or_for_a_failed_frame(wrong_cent
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("scenario", "least"), [("centres", 0.9), ("radii_1", 0.9), ("radii_03", 0.92)])
-def test_forces_of_the_first_frame_are_accurate_despite_wrong_rods(tmp_path, scenario, least):
-    solved = solve(tmp_path, scenario, 4, grains=450)
+@pytest.mark.parametrize("scenario", ["centres", "radii_1", "radii_03"])
+@pytest.mark.parametrize("seed", [4, 5])
+def test_later_frames_make_the_first_more_accurate_despite_wrong_rods(tmp_path, scenario, seed):
+    # Of seeds 4 to 7 r is .877 to .905, .889 to .920 and .902 to .925, and .636 to .739, .774 to .816 and .787 to .875
+    # before.
+    solved = solve(tmp_path, scenario, seed, grains=450)
     frame = solved.complete().frames[0]
-    assert agreement(frame, solved.true[0]) > least
+    assert agreement(frame, solved.true[0]) > max(agreement(solved.frames[0], solved.true[0]) + 0.03, 0.86)
     assert frame.trust < agreement(frame, solved.true[0]) + 0.03
 
 
