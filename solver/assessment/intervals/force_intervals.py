@@ -63,7 +63,9 @@ _FITTED = FITTED["force_intervals"]
 # squares of the formula's σ/⟨f⟩, of FLOOR, of √(1 − P(bears)) f, and for the first frame of FIRST_SCALE f. Last axis:
 # f_n, f_t.
 FLOOR = np.array(_FITTED["floor"])
-MODEL_ERROR = np.array(_FITTED["model_error"])  # of f_n and f_t of hard grains, over ⟨f_n⟩, whatever the noise
+# Of f_n and f_t of hard grains at f_n = ⟨f_n⟩, over it, whatever the noise; in proportion to f_n between MODEL_FORCES.
+MODEL_ERROR = np.array(_FITTED["model_error"])
+MODEL_FORCES = (0.1, 1.2)  # over ⟨f_n⟩
 FIRST_SCALE: float = _FITTED["first_scale"]
 TYPICAL = np.array(_FITTED["typical"])
 MARGIN: float = _FITTED["margin"]
@@ -172,8 +174,10 @@ def calibrate_sd(frame: FrameForces) -> FrameForces:
 
 def _added_variance(frame: FrameForces, mean: float) -> Array:
     """Variances (c, 2) [N²] that no disagreement of the members shows: of the scale and of the model."""
-    model = 0.0 if frame.soft else MODEL_ERROR * mean
-    return _scale_errors(frame) ** 2 + model**2
+    if frame.soft:
+        return _scale_errors(frame) ** 2
+    size = np.clip(np.nan_to_num(frame.fn / mean), *MODEL_FORCES)[:, None]
+    return _scale_errors(frame) ** 2 + (size * MODEL_ERROR * mean) ** 2
 
 
 def _errors_with_force(frame: FrameForces, mean: float) -> Array:
