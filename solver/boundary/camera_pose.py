@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bodies.grains import Array
+from ..bodies.wall_shapes import STRAIGHT
 from ..calibration.gaps import GapRows, MeasuredSequence, find_gap_rows, measure_gaps
 from ..quantity import Quantity
 from .picture_shifts import find_picture_shifts
@@ -87,7 +88,9 @@ def find_camera_pose(sequence: MeasuredSequence) -> CameraPose:
     # ones its displacement would seem smaller.
     rows = find_gap_rows(sequence, -np.inf, wall_reach=FARTHEST * radius)
     geometry = measure_gaps(rows, sequence.position, sequence.endpoints, sequence.radius, sequence.side)
-    start = find_picture_shifts(rows, geometry, seen, radius)
+    start = np.zeros((len(seen), 2))
+    if sequence.side is None or np.all(sequence.side == STRAIGHT):  # the rods at a circle show no direction
+        start = find_picture_shifts(rows, geometry, seen, radius)
     bears = geometry.gap + np.einsum("mk,mk->m", geometry.normal, start[rows.frame]) < REACH * radius
     often = np.bincount(rows.pair[bears], minlength=int(rows.pair.max(initial=-1)) + 1) > 0.5 * seen.sum()
     rows, geometry = rows.select(often[rows.pair]), geometry.select(often[rows.pair])

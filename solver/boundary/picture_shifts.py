@@ -17,6 +17,7 @@ from ..calibration.gaps import GapGeometry, GapRows
 OUTERMOST = 5  # rods, whose median gap is that of a wall
 FEWEST = 3  # of them
 LEAST = 0.05  # of a mean radius: smaller shifts are left to the comparison of photographs
+MOST = 1.0  # … and larger ones are no shifts: rods that are farther from a wall are not next to it
 CONSISTENT = 0.25  # of a shift: walls that disagree by more are misplaced, or bear no rod
 KNOWN = 0.9  # of the photographs whose shift must be known
 STABLE = 1e-3  # least singular value of the walls' normals: parallel walls show one direction only
@@ -44,7 +45,8 @@ def find_picture_shifts(rows: GapRows, geometry: GapGeometry, seen: NDArray[np.b
     Notes
     -----
     The least squares of n_w·t = −g_w over the walls w of a photograph, n_w their mean outward normal and g_w the median
-    of the OUTERMOST smallest gaps. It counts where no wall is off by more than CONSISTENT |t| + LEAST R. Photographs
+    of the OUTERMOST smallest gaps. It counts up to MOST R where no wall is off by more than CONSISTENT |t| + LEAST R.
+    Photographs
     without one have that of the nearest photograph.
     """
     shifts = np.full((len(seen), 2), np.nan)
@@ -78,5 +80,5 @@ def _shift_of(normal: Array, gap: Array, radius: float) -> Array | None:
     if len(gap) < 2 or np.linalg.svd(normal, compute_uv=False)[-1] < STABLE:
         return None
     shift: Array = np.linalg.lstsq(normal, -gap, rcond=None)[0].astype(np.float64)
-    left = np.abs(normal @ shift + gap).max()
-    return shift if left <= CONSISTENT * np.linalg.norm(shift) + LEAST * radius else None
+    size, left = float(np.linalg.norm(shift)), float(np.abs(normal @ shift + gap).max())
+    return shift if size <= MOST * radius and left <= CONSISTENT * size + LEAST * radius else None

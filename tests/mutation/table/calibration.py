@@ -126,13 +126,14 @@ MUTANTS = [
     *mutants_of(
         "solver/boundary/picture_shifts.py",
         "tests/solver/boundary/test_boundary.py",
-        ("CONSISTENT * np.linalg.norm(shift) + LEAST * radius", "np.inf"),
+        ("CONSISTENT * size + LEAST * radius", "np.inf"),
         ("shifts, axis=1).max() > LEAST * radius", "shifts, axis=1).max() > np.inf"),
     ),
     *mutants_of(
         "solver/boundary/camera_pose.py",
         "tests/solver/boundary/test_boundary.py",
         ("np.median((pose - start)[fitted], axis=0)", "np.median(pose[fitted], axis=0)"),
+        ("np.all(sequence.side == STRAIGHT)", "True"),
     ),
     *mutants_of(
         "solver/boundary/exchanged_sizes.py",

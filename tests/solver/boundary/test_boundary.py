@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rodsight.solver.bodies.wall_shapes import IN, OUT, circle_ends
 from rodsight.solver.boundary.bars import find_wall_bars
 from rodsight.solver.boundary.boundary_correction import BoundarySettings, correct_boundary
 from rodsight.solver.boundary.camera_pose import find_camera_pose
@@ -231,6 +232,23 @@ def test_one_misplaced_wall_is_no_displacement_of_the_camera(outward) -> None:
     endpoints = sequence.endpoints.copy()
     endpoints[FRAMES // 2 :, 1, :, 0] += outward * RADIUS
     assert not picture_shifts(replace(sequence, endpoints=endpoints)).any()
+
+
+def test_rods_between_two_circles_show_no_shift_by_the_outermost() -> None:
+    rng = np.random.default_rng(3)
+    angle = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    along = np.column_stack([np.cos(angle), np.sin(angle)])
+    outer, inner = 12.0 * RADIUS, 6.0 * RADIUS
+    place = np.concatenate([(outer - RADIUS) * along, (inner + RADIUS) * along[::2]])
+    errors = 0.05 * RADIUS * rng.normal(size=place.shape)  # of centres
+    position = np.tile(place + errors, (FRAMES, 1, 1)) + NOISE * rng.normal(size=(FRAMES, *place.shape))
+    ends = circle_ends(np.zeros((2, 2)), np.array([outer, inner]), np.zeros(2))
+    shape = position.shape[:2]
+    ring = MeasuredSequence(
+        np.full(shape[1], RADIUS), position, np.zeros(shape), np.ones(shape, bool), np.tile(ends, (FRAMES, 1, 1, 1)),
+        np.full(shape, NOISE), np.array([IN, OUT], np.int8),
+    )  # fmt: skip
+    assert np.abs(find_camera_pose(ring).shift).max() < 0.01 * RADIUS
 
 
 def test_the_shift_of_a_picture_needs_walls_of_two_directions() -> None:

@@ -198,7 +198,7 @@ def test_a_wrong_friction_widens_by_fractions_of_the_force_and_of_the_mean(frame
 def test_standard_deviations_are_what_was_fitted(frame):
     """Of the motion, T = 0.9: factor of the group · exp(5.37 · 0.1 + 0.04 ln(c/500)) · 0.2 (s/0.2)^0.91, and of f_t.
 
-    The error of the model, .06 and .02 of the force, at least a tenth and at most 1.2 of the mean, is added in quadrature.
+    The error of the model, .06 and .02 of the force, from a tenth to 1.2 of the mean, is added in quadrature.
     """
     mean = frame.fn[frame.fn > 0].mean()
     size = np.log((frame.fn > 0).sum() / 500.0)
