@@ -26,7 +26,8 @@ MUTANTS = [
     *mutants_of(
         "solver/assessment/intervals/force_intervals.py",
         FORCE_INTERVALS,
-        ("_scale_errors(frame) ** 2 + model**2", "_scale_errors(frame) ** 2"),
+        ("(size * MODEL_ERROR * mean) ** 2", "0.0"),
+        ("MODEL_FORCES = (0.1, 1.2)", "MODEL_FORCES = (1.0, 1.0)"),
         ("_scale_errors(wider) ** 2 - _scale_errors(frame) ** 2", "_scale_errors(wider) ** 2"),
         ("np.where(stated > 0.0, np.sqrt(stated**2 + variance), stated)", "np.sqrt(stated**2 + variance)"),
     ),
