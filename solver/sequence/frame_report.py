@@ -119,7 +119,9 @@ def _describe(
     starts = measure_start_residuals(step, with_cold=problem.settings.chain.keep != "none")
     bears, slides = _contact_probabilities(problem, estimate)
     strain = _strain_since_start(problem)
-    reason = (estimate.remark, decision.reason, step.solution.stop.value)
+    # Without a stopping level the number of sweeps is part of the method, and the same in every frame.
+    by_level = problem.settings.chain.force_change is not None
+    reason = (estimate.remark, decision.reason, step.solution.stop.value if by_level else "")
     return FrameForces(
         frame=problem.k,
         contacts=contacts,
