@@ -27,7 +27,7 @@ DEEP = 6.0  # robust standard deviations above the usual overlap, and NOISE of a
 ONE_SIDED = 1.2  # times the least jump, where only photographs on one side show the motion
 PASSES = 8  # an outlier hides the one before or after it until it is interpolated
 MOST = 0.1  # of the poses of a frame: where more jump, the packing rearranges
-MISPLACED = 0.25  # of a radius, and JUMP deviations among the neighbours: a doubtful pose so far from theirs is wrong
+MISPLACED = 0.25  # of a radius, and JUMP deviations among the neighbours: a suspect pose so far from theirs is wrong
 NAMED, LISTED = 6, 4  # rods of one photograph, and photographs, that a sentence lists
 
 
@@ -58,7 +58,7 @@ def remove_outliers(
     tracks = without_poses(tracks, outlier) if outlier.any() else tracks
     remarks = (
         _describe(
-            misplaced, "is a doubtful match far from its neighbours", "are doubtful matches far from their neighbours"
+            misplaced, "is a suspect match far from its neighbours", "are suspect matches far from their neighbours"
         ),
         _describe(outlier, "jumps against the neighbours", "jump against the neighbours"),
     )
@@ -157,24 +157,24 @@ def find_outliers(tracks: Tracks, walls: WallTracks | None = None) -> NDArray[np
 
 
 def find_misplaced(tracks: Tracks) -> NDArray[np.bool_]:
-    """Find poses (f, n) that the tracker doubts, far from where neighbours and other photographs put them.
+    """Find poses (f, n) that the tracker suspects, far from where neighbours and other photographs put them.
 
     Notes
     -----
     A match of little certainty may be on another part of the picture; from then on the rod seems to move with its
     neighbours again. Its place is expected from the nearest photographs in which it is certain, and from the motion of
-    its neighbours since. Where more than MOST of the poses of a photograph are doubtful, as in a blurred one, all stay.
+    its neighbours since. Where more than MOST of the poses of a photograph are suspect, as in a blurred one, all stay.
     """
     present = tracks.present
-    doubtful = present & (tracks.status == TrackStatus.SUSPECT)
-    found = np.zeros_like(doubtful)
-    doubtful[doubtful.mean(axis=1) > MOST] = False
-    if tracks.boundary is not None or not doubtful.any():
+    suspect = present & (tracks.status == TrackStatus.SUSPECT)
+    found = np.zeros_like(suspect)
+    suspect[suspect.mean(axis=1) > MOST] = False
+    if tracks.boundary is not None or not suspect.any():
         return found
-    certain = np.where((present & ~doubtful)[..., None], tracks.position, np.nan)
+    certain = np.where((present & ~suspect)[..., None], tracks.position, np.nan)
     seen = np.isfinite(certain[..., 0])
-    for k in np.flatnonzero(doubtful.any(axis=1)).tolist():
-        rows = np.flatnonzero(doubtful[k] & seen.any(axis=0))
+    for k in np.flatnonzero(suspect.any(axis=1)).tolist():
+        rows = np.flatnonzero(suspect[k] & seen.any(axis=0))
         if len(rows) and seen[k].sum() > NEIGHBOURS:
             expected = interpolate_poses(tracks.time, certain, k, rows)
             distance = np.linalg.norm(tracks.position[k, rows] - expected.place, axis=1)

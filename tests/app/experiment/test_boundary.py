@@ -134,9 +134,9 @@ def test_a_hole_may_be_of_rods_that_the_first_photograph_hides(tmp_path):
     experiment, *bounds = bound(write(tmp_path, place, '[walls]\nfile = "walls.csv"', walls=walls))
     photographs = PhotographsSection.model_validate({"files": "*.png", "interval": 1.0, "pixel_size": 1e-4})
     config = experiment.config.model_copy(update={"photographs": photographs})
-    said = free_surfaces(replace(experiment, config=config), *bounds)
-    assert [each.endswith("--frames 1:") for each in said] == ["hole inside" in each for each in said]
-    assert any("hole inside" in each for each in said)
+    stated = free_surfaces(replace(experiment, config=config), *bounds)
+    assert [each.endswith("--frames 1:") for each in stated] == ["hole inside" in each for each in stated]
+    assert any("hole inside" in each for each in stated)
 
 
 @pytest.mark.thorough

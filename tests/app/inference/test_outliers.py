@@ -218,7 +218,7 @@ def test_every_photograph_with_confused_names_is_listed_up_to_a_few():
     assert words.endswith("; …")
 
 
-def doubted(tracks: Tracks, *poses) -> Tracks:
+def suspected(tracks: Tracks, *poses) -> Tracks:
     status = tracks.status.copy()
     for frame, rod in poses:
         status[frame, rod] = TrackStatus.SUSPECT
@@ -226,20 +226,20 @@ def doubted(tracks: Tracks, *poses) -> Tracks:
 
 
 @pytest.mark.parametrize("frames", [range(2, 4), range(3, FRAMES), range(2)])
-def test_doubtful_poses_far_from_their_neighbours_count_as_lost(frames):
+def test_suspect_poses_far_from_their_neighbours_count_as_lost(frames):
     far = [(k, ROD, (0.006, 0.004)) for k in frames]
-    tracks = doubted(sheared_tracks(far), *((k, ROD) for k in frames), (4, 3))
+    tracks = suspected(sheared_tracks(far), *((k, ROD) for k in frames), (4, 3))
     found, remark = remove_outliers(tracks)
     assert np.argwhere(found.lost).tolist() == [[k, ROD] for k in frames]
-    assert remark.startswith(f"{len(frames)} poses in {len(frames)} photographs are doubtful matches far from")
+    assert remark.startswith(f"{len(frames)} poses in {len(frames)} photographs are suspect matches far from")
     stays = np.zeros((FRAMES, N), np.bool_)
     stays[:, ROD] = True  # placed by hand
     assert remove_outliers(tracks, placed=stays)[0] is tracks
 
 
-def test_doubtful_poses_stay_where_most_are_or_where_nothing_is_certain():
+def test_suspect_poses_stay_where_most_are_or_where_nothing_is_certain():
     far = [(k, ROD, (0.006, 0.004)) for k in range(FRAMES)]
-    always = doubted(sheared_tracks(far), *((k, ROD) for k in range(FRAMES)))
+    always = suspected(sheared_tracks(far), *((k, ROD) for k in range(FRAMES)))
     assert not find_misplaced(always).any()
-    blurred = doubted(sheared_tracks(far[2:3]), *((2, rod) for rod in {ROD, *range(N // 5)}))
+    blurred = suspected(sheared_tracks(far[2:3]), *((2, rod) for rod in {ROD, *range(N // 5)}))
     assert not find_misplaced(blurred).any()

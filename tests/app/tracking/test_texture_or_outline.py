@@ -48,5 +48,5 @@ def test_outlines_are_preferred_where_paint_does_not_fix_a_rod(paint: str, reaso
             for seed, (x, y) in enumerate([(RODS.x, RODS.y), moved])
         )
     found = refine_grains(pictures[0], RODS.x, RODS.y, RODS.radius)
-    assert reason in (said := prefer_outlines(pictures[0], pictures[1], found))
-    assert bool(said) == bool(reason)
+    assert reason in (stated := prefer_outlines(pictures[0], pictures[1], found))
+    assert bool(stated) == bool(reason)

@@ -277,18 +277,18 @@ def test_rods_of_one_size_all_have_it(tmp_path, capsys):
     discs(tmp_path)
     flags = ("--photographs", "shots/*.png", "--interval", 5, "--pixel-size", 1e-4, "--walls", "none")
     assert rodsight("init", tmp_path, *flags) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert "The rods have one size, radius 2.251 mm in the photograph" in said
+    stated = " ".join(capsys.readouterr().out.split())
+    assert "The rods have one size, radius 2.251 mm in the photograph" in stated
     rows = (tmp_path / "grains.csv").read_text().splitlines()[1:]
     assert len({row.split(",")[3] for row in rows}) == 1
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(("radius", "said"), [(0.002255, ""), (0.00231, "% smaller than the known radii")])
-def test_radii_that_the_rims_contradict_are_reported(tmp_path, capsys, radius, said):
+@pytest.mark.parametrize(("radius", "stated"), [(0.002255, ""), (0.00231, "% smaller than the known radii")])
+def test_radii_that_the_rims_contradict_are_reported(tmp_path, capsys, radius, stated):
     discs(tmp_path)
     flags = ("--photographs", "shots/*.png", "--interval", 5, "--pixel-size", 1e-4, "--walls", "none")
     assert rodsight("init", tmp_path, *flags, "--radii", radius) == 0
     printed = " ".join(capsys.readouterr().out.split())
-    assert said in printed
-    assert ("By their rims" in printed) == bool(said)
+    assert stated in printed
+    assert ("By their rims" in printed) == bool(stated)

@@ -119,9 +119,9 @@ MUTANTS = [
     *mutants_of(
         "app/inference/correction/outliers.py",
         OUTLIERS,
-        ("doubtful[doubtful.mean(axis=1) > MOST] = False", "pass"),
+        ("suspect[suspect.mean(axis=1) > MOST] = False", "pass"),
         ("MISPLACED = 0.25", "MISPLACED = 2.5"),
-        ("certain = np.where((present & ~doubtful)[..., None]", "certain = np.where(present[..., None]"),
+        ("certain = np.where((present & ~suspect)[..., None]", "certain = np.where(present[..., None]"),
     ),
     *mutants_of(
         "app/inference/correction/outliers.py",

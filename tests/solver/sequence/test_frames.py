@@ -255,12 +255,12 @@ def test_inertia_alone_has_no_correction_and_no_trust():
     assert np.isnan(frame.trust)
 
 
-@pytest.mark.parametrize(("level", "said"), [(None, False), (1e-9, True)])
-def test_the_end_of_the_sweeps_is_a_reason_where_a_level_should_end_them(level, said):
+@pytest.mark.parametrize(("level", "stated"), [(None, False), (1e-9, True)])
+def test_the_end_of_the_sweeps_is_a_reason_where_a_level_should_end_them(level, stated):
     packing, snapshots = sheared_frames(3)
     chain = replace(SETTINGS.chain, force_change=level, sweeps=40)
     frame, _ = run(packing, snapshots, replace(SETTINGS, chain=chain))[2]
-    assert ("convergence is not claimed" in frame.reason) == said
+    assert ("convergence is not claimed" in frame.reason) == stated
 
 
 @pytest.mark.thorough
