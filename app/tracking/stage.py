@@ -32,8 +32,9 @@ from ..tracks import Tracks, WallTracks
 from . import DETECTIONS, PICTURES
 from .corner_discs import CORNERS, follow_corners
 from .detection.channels import count_clear, count_discs, is_coloured
-from .detection.detect import Detection, DetectionSettings, refine_grains
+from .detection.detect import Detection, DetectionSettings
 from .detection.false_detections import describe_channels, describe_false_detections
+from .detection.rim_quality import refine_given
 from .follow import Execution, FollowedWalls, ReferenceGrains, Series, follow_photographs, follow_walls
 from .fringes import measure_fringes
 from .missed_rods import detect_rods
@@ -206,9 +207,9 @@ def _detect(
     assert section is not None
     guess = read_grain_guess(experiment)
     if guess is not None:
-        detection = refine_grains(first, guess.x, guess.y, guess.radius)
+        detection = refine_given(first, guess.x, guess.y, guess.radius)
         if section.follow == "outline":  # dark discs are given as well
-            dark = refine_grains(np.float32(FULL_SCALE) - first, guess.x, guess.y, guess.radius)
+            dark = refine_given(np.float32(FULL_SCALE) - first, guess.x, guess.y, guess.radius)
             detection = max(detection, dark, key=lambda found: float(found.quality @ found.radius))
         centres = np.stack([detection.x, detection.y], axis=1)
         # The user measured the radius on this photograph, so it contains the lens distortion.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...experiment.pictures.image import Image
-from .detect import Detection, DetectionSettings, detect_grains, refine_grains
+from .detect import DetectionSettings, detect_grains, refine_grains
 
 Circle = tuple[float, float, float]  # x, y, radius [px]
 
@@ -16,7 +16,6 @@ SEEN = 0.2  # fraction of an outline of any radius that is seen, at least
 DRAWN = 1.3  # greatest ratio of the drawn radius and that of the rim, or its inverse
 BESIDE = 0.5  # [radii] between the click and the middle of the grain
 SMALLEST = 3.5  # [px] radius that is looked for
-FEWEST_RIMS = 10  # from which a common error of the radii is read
 
 
 def fit_clicked(image: Image, drawn: Circle, sizes: Sequence[float] = ()) -> Circle | None:
@@ -50,13 +49,6 @@ def fit_clicked(image: Image, drawn: Circle, sizes: Sequence[float] = ()) -> Cir
     if fitted is not None and refined is None and not sizes:
         fitted = _refined_freely(part, fitted) or fitted
     return None if fitted is None else (fitted[0] + left, fitted[1] + top, fitted[2])
-
-
-def compare_rims(image: Image, rods: Detection) -> float:
-    """Compute the median ratio of the radii that the visible rims show to those of the rods; NaN: few rims are seen."""
-    free = refine_grains(image, rods.x, rods.y, rods.radius, fixed_radius=False)
-    seen = (free.quality > SEEN) & np.isfinite(free.sigma)
-    return float(np.median(free.radius[seen] / rods.radius[seen])) if seen.sum() >= FEWEST_RIMS else np.nan
 
 
 def _refined(image: Image, drawn: Circle, sizes: Sequence[float]) -> Circle | None:

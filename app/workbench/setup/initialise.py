@@ -26,8 +26,8 @@ from ...process.errors import InputError
 from ...process.frame_range import ALL_FRAMES, FrameRange
 from ...solver.bodies.wall_shapes import STRAIGHT
 from ...tracking.detection.channels import View, compare_views
-from ...tracking.detection.clicked_circle import compare_rims
 from ...tracking.detection.detect import Detection, DetectionSettings, refine_grains
+from ...tracking.detection.rim_quality import describe_faint_rims, describe_scale
 from ...tracking.outline.missing_discs import add_missing_discs
 from ...tracking.texture_or_outline import prefer_outlines
 from ...tracking.walls.plain_bars import can_be_followed
@@ -39,8 +39,6 @@ from .validation import ValidationResult, first_tracks, validate
 
 PICTURE = "understood.png"
 MOST_VIEWS, KEPT = 3, 0.8  # of a photograph that are tried; fraction of the discs of the small copy
-# Error of radii by the pixel size that is reported, and that of the place of a rim [px], in blurred pictures too.
-WRONG_SCALE, UNSHARP = 0.01, 0.3
 KEPT_IN_CLASSES = 0.98  # of the rods must be found again with the sizes that nearly all have
 ASSUMED_INTERVAL = 1.0  # s
 FOUND, NONE = "auto", "none"
@@ -133,11 +131,13 @@ def _initialise(folder: Path, draft: Draft, flags: SetupFlags, video: list[str])
         found = _without_errors(draft, "photographs")
         notes = [*video, *left_out, *remarks, *classes, *how, *notes, *plain]
         write_atomically(folder / PICTURE, draw_setup(_first(photographs, selection), found))
-        scaled = _describe_scale(first, detection) if flags.radii else ""
+        faint = "" if flags.grains is not None else describe_faint_rims(detection)
+        scaled = describe_scale(first, detection) if flags.radii else ""
     for note in notes:
         found.steps["walls"].add_warning(note)
-    if scaled:
-        found.steps["scale"].add_warning(scaled)
+    for step, sentence in (("rods", faint), ("scale", scaled)):
+        if sentence:
+            found.steps[step].add_warning(sentence)
     if flags.interval is None:
         found.steps["photographs"].add_warning(
             f"The time between photographs is unknown: {ASSUMED_INTERVAL:g} s is assumed, on which velocities depend. "
@@ -227,18 +227,6 @@ def _in_classes(
     listed = ", ".join(f"{1e3 * size * found.scale.mean_size:.4g}" for size in sizes)
     many = f"{len(sizes)} sizes" if len(sizes) > 1 else "one size"
     return again, [f"The rods have {many}, radius {listed} mm in the photograph: all are set to it. Better: --radii."]
-
-
-def _describe_scale(first: Image, rods: Detection) -> str:
-    """State that the rims show other radii than the known ones, which a wrong pixel size does; empty: they agree."""
-    ratio = compare_rims(first, rods)
-    off = abs(ratio - 1.0)
-    if not (off > WRONG_SCALE and off * float(np.median(rods.radius)) > UNSHARP):
-        return ""
-    return (
-        f"By their rims the rods are {100.0 * off:.1f} % {'larger' if ratio > 1.0 else 'smaller'} than the known radii "
-        "at this pixel size: measure it along a known length (rodsight open, step Scale), or check the radii."
-    )
 
 
 def _without_video(folder: Path, flags: SetupFlags, on_failure: ExitStack) -> tuple[SetupFlags, list[str]]:

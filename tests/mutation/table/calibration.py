@@ -118,6 +118,12 @@ MUTANTS = [
         ),
     ),
     *mutants_of(
+        "app/tracking/detection/rim_quality.py",
+        "tests/app/tracking/detection/test_rim_quality.py",
+        ("(found.quality > 0.0) & (found.quality < FAINT)", "found.quality < 0.0"),
+        ("len(faint) > MANY * rods.count", "False"),
+    ),
+    *mutants_of(
         "app/tracking/texture_or_outline.py",
         "tests/app/tracking/test_texture_or_outline.py",
         ("texture.deviation > BETTER_AGREEMENT * outline.deviation", "texture.deviation > np.inf"),
