@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, KDTree
 
 from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
@@ -22,6 +22,10 @@ MIN_WINDOW = 1.0  # [px] half width of the last searches
 RIM_POINTS = 360  # points on the outline of a rod, from which the hull is computed
 SAME_BAR = np.deg2rad(1.5)  # greatest angle between the hull's sides of one bar
 MIN_ANGLE = np.deg2rad(12.0)  # least angle between two bars
+NEXT = 0.1  # mean radii between two circles that are next to each other
+MOST_HELD = 0.8  # of the circles
+# Circles that touch a line: so few may be no rods, if the line without them touches more than as many more; times.
+FEW, ROUNDS = 2, 3
 
 
 def snap_to_edge(image: Image, line: Array, max_shift: float) -> tuple[Array, float]:
@@ -82,6 +86,9 @@ def snap_to_edge(image: Image, line: Array, max_shift: float) -> tuple[Array, fl
 def find_bars(x: Array, y: Array, radius: Array, count: int = 4) -> Array:
     """Find the lines that bound circles on their longest sides: the faces of a frame's bars.
 
+    Circles that the others do not hold, as bolts and spots of a bar's paint, are left out, and one or two that a line
+    rests on where more touch it without them.
+
     Parameters
     ----------
     x, y, radius : (n,) array
@@ -95,6 +102,38 @@ def find_bars(x: Array, y: Array, radius: Array, count: int = 4) -> Array:
         Lines from corner to corner [px], the packing on their left in the world, counter-clockwise around it, the
         lowest in the picture first; fewer than `count` where the hull has fewer sides.
     """
+    circles = np.column_stack([x, y, radius])
+    circles = circles[are_held(x, y, radius)]
+    lines = _hull_lines(circles, count)
+    for _ in range(ROUNDS):
+        few = [touching for touching in _touching(lines, circles) if 0 < touching.sum() <= FEW]
+        inside = ~np.any(few, axis=0) if few else np.ones(len(circles), np.bool_)
+        moved = _hull_lines(circles[inside], count)
+        # A free surface rests on few circles as well, and on few others below them.
+        if not few or len(moved) != len(lines) or _least(moved, circles) <= _least(lines, circles) + FEW:
+            break
+        circles, lines = circles[inside], moved
+    return lines
+
+
+def _least(lines: Array, circles: Array) -> int:
+    """Number of circles that touch the line that fewest touch."""
+    return min((int(each.sum()) for each in _touching(lines, circles)), default=0)
+
+
+def _touching(lines: Array, circles: Array) -> list[NDArray[np.bool_]]:
+    """Which circles (n, 3) touch each line (w, 2, 2)."""
+    found = []
+    for start, end in lines:
+        along = (end - start) / np.linalg.norm(end - start)
+        away = np.abs((circles[:, :2] - start) @ np.array([-along[1], along[0]]))
+        found.append(np.abs(away - circles[:, 2]) < NEXT * circles[:, 2].mean())
+    return found
+
+
+def _hull_lines(circles: Array, count: int) -> Array:
+    """The lines of `find_bars` that bound all circles (n, 3)."""
+    x, y, radius = circles.T
     polar = np.linspace(0.0, 2.0 * np.pi, RIM_POINTS, endpoint=False)
     rim_x, rim_y = x[:, None] + radius[:, None] * np.cos(polar), y[:, None] + radius[:, None] * np.sin(polar)
     rim = np.stack([rim_x, rim_y], axis=-1).reshape(-1, 2) * [1.0, -1.0]  # y up
@@ -116,6 +155,15 @@ def find_bars(x: Array, y: Array, radius: Array, count: int = 4) -> Array:
     corners = [_meet(*a, *b) for a, b in pairwise([chosen[-1], *chosen])] if len(chosen) > 2 else []
     lines = [(corners[k], corners[(k + 1) % len(corners)]) for k in range(len(corners))]
     return np.array(lines).reshape(-1, 2, 2) * [1.0, -1.0]
+
+
+def are_held(x: Array, y: Array, radius: Array) -> NDArray[np.bool_]:
+    """Whether each circle (n,) is next to two others or more; all where this is so of few, as in a loose packing."""
+    place, reach = np.column_stack([x, y]), NEXT * float(radius.mean())
+    pairs = KDTree(place).query_pairs(2.0 * float(radius.max()) + reach, output_type="ndarray")
+    gap = np.linalg.norm(place[pairs[:, 1]] - place[pairs[:, 0]], axis=1) - radius[pairs].sum(axis=1)
+    held = np.bincount(pairs[gap < reach].ravel(), minlength=len(x)) >= 2
+    return held if held.mean() > MOST_HELD else np.ones(len(x), np.bool_)
 
 
 def depth_in_circles(line: Array, x: Array, y: Array, radius: Array) -> float:

@@ -42,6 +42,7 @@ TOUCHES = 0.08  # radii between the edge of a bar and the rod next to it; else i
 # Radii form classes where so many, from so many rods on, are within so much of one of so few classes.
 NEARLY_ALL, FEWEST_EVIDENT, EVIDENT, MOST_EVIDENT = 0.85, 20, 0.015, 5
 RARE = 0.08  # fraction of the rods that no class has
+SNAP = 0.6  # radii from the line that bounds the rods to the edge of a bar, at most
 SEEN = 0.34  # fraction of the profiles across a line that must show the edge
 NAMES = ("bottom", "right", "top", "left")
 # Densities [kg/m³] and textbook friction coefficients of dry, clean rods: initial values.
@@ -179,12 +180,17 @@ def find_walls(image: Image, found: ValidationResult) -> Array:
             GRAINS, "", "holds too few rods to find bars around them: detect the rods first, or draw the bars"
         )
     lines = find_bars(rods.x, rods.y, rods.radius)
-    snapped = [snap_to_edge(image, line, 0.6 * float(np.median(rods.radius))) for line in lines]
+    snapped = [snap_to_edge(image, line, SNAP * float(np.median(rods.radius))) for line in lines]
     chosen = [
         moved if fraction >= SEEN and abs(depth_in_circles(moved, rods.x, rods.y, rods.radius)) < TOUCHES else line
         for line, (moved, fraction) in zip(lines, snapped, strict=True)
     ]
     return lines_to_corners(np.array(chosen))
+
+
+def shows_edge(image: Image, line: Array, rods: GrainGuess) -> bool:
+    """Whether the edge of a bar is seen along a line (2, 2) [px]."""
+    return snap_to_edge(image, line, SNAP * float(np.median(rods.radius)))[1] >= SEEN
 
 
 def names_of(lines: Array) -> tuple[str, ...]:
@@ -267,7 +273,7 @@ def detect(
     detection = detect_rods(image, settings)
     if classes:
         _compare_scales(image, classes, detection)
-    return _within_walls(detection, found)
+    return within_walls(detection, found)
 
 
 def _compare_scales(image: Image, classes: Sequence[float], found: Detection | None) -> None:
@@ -366,7 +372,7 @@ def evident_classes(radius: Array) -> Array | None:
     return classes if np.mean(off < EVIDENT) >= NEARLY_ALL and np.median(off) < 0.25 * EVIDENT else None
 
 
-def _within_walls(detection: Detection, found: ValidationResult) -> Detection:
+def within_walls(detection: Detection, found: ValidationResult) -> Detection:
     """Drop circles beyond the walls: screws and wheels of the apparatus are round, too."""
     if found.walls is None or found.scale is None:
         return detection

@@ -41,6 +41,7 @@ PICTURE = "understood.png"
 MOST_VIEWS, KEPT = 3, 0.8  # of a photograph that are tried; fraction of the discs of the small copy
 KEPT_IN_CLASSES = 0.98  # of the rods must be found again with the sizes that nearly all have
 ASSUMED_INTERVAL = 1.0  # s
+FEWEST_BARS = 2  # of a packing with open sides; with fewer the outermost rods are its boundary
 FOUND, NONE = "auto", "none"
 
 
@@ -279,6 +280,12 @@ def _replace_plain_bars(
     first, second = (selection.cut(read_photograph(file, channel=selection.channel)) for file in photographs.files[:2])
     radius = float(rods.radius.mean()) * scale.mean_size
     seen = can_be_followed((first, second), walls.endpoints[0], scale, radius)
+    named = list(zip(walls.name, scale.to_pixels(walls.endpoints[0]), strict=True))
+    barred = np.array([name in flags.pressure or edits.shows_edge(first, line, rods) for name, line in named])
+    if not barred.all() and barred.sum() >= FEWEST_BARS and seen[barred].all():
+        edits.set_walls(draft, found, [named[w] for w in np.flatnonzero(barred)], "sides without a bar left out")
+        names = ", ".join(repr(named[w][0]) for w in np.flatnonzero(~barred))
+        return [f"No bar is seen at {names}: the packing is open there. Draw it by rodsight open if there is one."]
     if seen.all():
         return []
     names = ", ".join(repr(name) for name, here in zip(walls.name, seen, strict=True) if not here)
@@ -358,6 +365,11 @@ def _find_rods_and_walls(
                 f"Wall {name!r} is left out, since it would cut through {state_count(count, 'rod')}."
                 for name, count in cut.items()
             ]
+        inside = edits.within_walls(detection, found)
+        if inside.count < detection.count:
+            edits.set_rods(draft, "circles beyond the bars left out", edits.as_guess(inside), flags.radii)
+            found = validate(draft)
+            notes.append(f"{state_count(detection.count - inside.count, 'circle')} beyond the bars left out: no rods.")
         find_discs(draft, first, found)
         wrong = validate(draft).steps["walls"].errors
         if wrong and not flags.pressure:  # rods that stand in no frame of four bars, or circles that are no rods

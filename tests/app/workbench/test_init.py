@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment, read_grain_guess
-from rodsight.workbench.setup import edits
+from rodsight.workbench.setup import edits, initialise
 
 from tests.program import rodsight
 
@@ -292,3 +292,29 @@ def test_radii_that_the_rims_contradict_are_reported(tmp_path, capsys, radius, s
     printed = " ".join(capsys.readouterr().out.split())
     assert stated in printed
     assert ("By their rims" in printed) == bool(stated)
+
+
+@pytest.mark.thorough
+def test_a_side_without_a_bar_leaves_the_others(folder, monkeypatch, capsys):
+    def shows_edge(image, line, rods):
+        return bool(line[:, 1].mean() > 0.2 * image.shape[0])  # not at the top
+
+    def can_be_followed(images, ends, *_):
+        return ends[:, :, 1].mean(axis=1) < 0.9 * ends[:, :, 1].max()
+
+    monkeypatch.setattr(edits, "shows_edge", shows_edge)
+    monkeypatch.setattr(initialise, "can_be_followed", can_be_followed)
+    flags = (
+        "--photographs",
+        "pictures/*.jpg",
+        "--interval",
+        30,
+        "--pixel-size",
+        2.5e-4,
+        "--radii",
+        "0.007,0.008,0.011",
+    )
+    assert rodsight("init", folder, *flags) == 0
+    assert "No bar is seen at 'top'" in " ".join(capsys.readouterr().out.split())
+    rows = (folder / "walls.csv").read_text().splitlines()[1:]
+    assert sorted({row.split(",")[1] for row in rows}) == ["bottom", "left", "right"]

@@ -118,6 +118,13 @@ MUTANTS = [
         ),
     ),
     *mutants_of(
+        "app/tracking/walls/inner_edge.py",
+        "tests/app/tracking/walls/test_inner_edge.py",
+        ("minlength=len(x)) >= 2", "minlength=len(x)) >= 0"),
+        ("if 0 < touching.sum() <= FEW", "if touching.sum() < 0"),
+        ("if held.mean() > MOST_HELD", "if True"),
+    ),
+    *mutants_of(
         "app/tracking/detection/rim_quality.py",
         "tests/app/tracking/detection/test_rim_quality.py",
         ("(found.quality > 0.0) & (found.quality < FAINT)", "found.quality < 0.0"),

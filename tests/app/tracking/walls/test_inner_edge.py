@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from rodsight.tracking.walls.inner_edge import depth_in_circles, find_bars, lines_to_corners, snap_to_edge
+from rodsight.tracking.walls.inner_edge import are_held, depth_in_circles, find_bars, lines_to_corners, snap_to_edge
 
 
 @pytest.fixture
@@ -66,3 +66,28 @@ def test_the_depth_of_a_line_in_circles_is_positive_inside_and_negative_beyond()
     assert depth_in_circles(floor, x, y, radius) == pytest.approx(0.0)
     assert depth_in_circles(floor - [0.0, 4.0], x, y, radius) == pytest.approx(0.4)
     assert depth_in_circles(floor - [0.0, -2.0], x, y, radius) == pytest.approx(-0.2)
+
+
+@pytest.mark.parametrize(
+    "others",
+    [
+        [(300.0, -60.0), (620.0, 200.0)],  # bolts beside the packing, as large as rods
+        [(281.0, 15.0)],  # a spot of a bar's paint next to two rods
+    ],
+)
+def test_bars_do_not_bound_circles_that_are_no_rods(others):
+    row, column = np.mgrid[0:9, 0:12]
+    x, y = (60.0 + 40.0 * column).ravel(), (50.0 + 40.0 * row).ravel()
+    alone = find_bars(x, y, np.full(x.size, 20.0))
+    more_x, more_y = (np.concatenate([each, more]) for each, more in zip((x, y), np.transpose(others), strict=True))
+    np.testing.assert_allclose(find_bars(more_x, more_y, np.full(len(more_x), 20.0)), alone, atol=0.05)
+
+
+def test_a_loose_packing_is_bounded_with_all_its_circles():
+    x, y = (60.0 * each.ravel() for each in np.mgrid[0:5, 0:6].astype(float))
+    assert are_held(x, y, np.full(x.size, 20.0)).all()
+    bars = find_bars(x, y, np.full(x.size, 20.0))
+    assert (bars.reshape(-1, 2).min(), bars.reshape(-1, 2).max()) == (
+        pytest.approx(-20.0, abs=0.05),
+        pytest.approx(320.0, abs=0.05),
+    )
