@@ -130,15 +130,15 @@ def _initialise(folder: Path, draft: Draft, flags: SetupFlags, video: list[str])
         found = _without_errors(draft, "photographs")
         plain = _replace_plain_bars(draft, flags, photographs, selection, found)
         found = _without_errors(draft, "photographs")
-        notes = [*video, *left_out, *remarks, *classes, *how, *notes, *plain]
         write_atomically(folder / PICTURE, draw_setup(_first(photographs, selection), found))
-        faint = "" if flags.grains is not None else describe_faint_rims(detection)
-        scaled = describe_scale(first, detection) if flags.radii else ""
-    for note in notes:
-        found.steps["walls"].add_warning(note)
-    for step, sentence in (("rods", faint), ("scale", scaled)):
-        if sentence:
-            found.steps[step].add_warning(sentence)
+        faint = [] if flags.grains is not None else [describe_faint_rims(detection)]
+        stated = {
+            "photographs": video, "scale": [describe_scale(first, detection)] if flags.radii else [],
+            "rods": [*left_out, *classes, *how, *faint], "walls": [*notes, *plain],
+        }  # fmt: skip
+    found.steps["rods"].messages += remarks  # of what is seen, which is no reason to look again
+    for step, sentence in ((step, each) for step, several in stated.items() for each in several if each):
+        found.steps[step].add_warning(sentence)
     if flags.interval is None:
         found.steps["photographs"].add_warning(
             f"The time between photographs is unknown: {ASSUMED_INTERVAL:g} s is assumed, on which velocities depend. "
