@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +79,21 @@ def name_missing(missing: Sequence[MissingNumbers]) -> list[str]:
         for each in missing[:LISTED]
     ]
     return [*stated, f"Numbers are missing at {len(missing) - LISTED} more places."] if missing[LISTED:] else stated
+
+
+def name_fractions(files: Sequence[Path]) -> list[str]:
+    """State that names with decimal numbers are not in the order of these numbers: 0.5 stands before 0.25."""
+    names = [re.fullmatch(r"(\D*)(\d+)\.(\d+)(\D*)", file.stem) for file in files]
+    if len({(name[1], name[4]) if name else None for name in names}) != 1 or names[0] is None:
+        return []
+    values = [float(f"{name[2]}.{name[3]}") for name in names if name]
+    later = next((k for k, (one, two) in enumerate(pairwise(values)) if one > two), None)
+    if later is None:
+        return []
+    return [
+        f"{files[later].name} stands before {files[later + 1].name}: parts of names are compared as whole numbers. If "
+        "they are decimal numbers, write them with as many digits each, or order the photographs by rodsight open."
+    ]
 
 
 def compare_with_camera(files: Sequence[Path], rotation: int, interval: float | None) -> list[str]:

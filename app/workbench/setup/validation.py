@@ -39,7 +39,7 @@ from ...solver.bodies.wall_shapes import bounding_distance
 from ...tracking.missed_rods import describe_missed_rods
 from ...tracks import Tracks, TrackStatus, WallTracks
 from .draft import Draft
-from .photograph_checks import LISTED, compare_with_camera, name_missing, unusable
+from .photograph_checks import LISTED, compare_with_camera, name_fractions, name_missing, unusable
 
 STEPS = ("photographs", "scale", "walls", "rods", "material")
 OF_KEYS = {  # the step of a key: the longest prefix counts
@@ -246,10 +246,10 @@ def _validate_order(found: ValidationResult, experiment: Experiment) -> None:
     found.all_files = tuple(experiment.matching())
     found.number = tuple(range(len(found.files)) if order is None else order.number.tolist())
     found.missing = missing_numbers(found.files) if order is None else []
-    interval = section.interval if "interval" in found.data.get("photographs", {}) else None
     uneven = order is not None and bool((np.diff(order.number) != 1).any())
+    interval = section.interval if "interval" in found.data.get("photographs", {}) else None
     notes = compare_with_camera(found.files, section.rotation, None if uneven else interval)
-    for sentence in (*name_missing(found.missing if section.times is None else ()), *notes):
+    for sentence in (*name_missing([] if section.times else found.missing), *name_fractions(found.files), *notes):
         step.add_warning(sentence)
 
 
