@@ -78,12 +78,12 @@ def free_surfaces(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> 
     side = np.argmax(surface.outward @ np.array([[0.0, 0.0, 1.0, -1.0], [1.0, -1.0, 0.0, 0.0]]), axis=1)
     place = np.where(surface.inner, len(SIDES), side)
     sentences = []
-    hidden = "" if experiment.config.photographs is None else HIDDEN
-    for k, (name, more) in enumerate((*((side, "") for side in SIDES), ("around a hole inside", hidden))):
+    for k, name in enumerate((*SIDES, "around a hole inside")):
         here = bare & (place == k)
         if np.count_nonzero(here) < FEWEST_BARE:
             continue
         x, y = surface.place[here].mean(axis=0)
+        more = HIDDEN if k == len(SIDES) and experiment.config.photographs is not None else ""
         sentences.append(
             f"The packing has a free surface {name}, near x = {x:.3g} m, y = {y:.3g} m, with neither wall nor boundary "
             "there: if something holds these rods, give it by [walls], or impose their measured motion by "

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bodies.grains import Array
-from ..bodies.wall_shapes import STRAIGHT
+from ..bodies.wall_shapes import STRAIGHT, all_sides
 from ..calibration.gaps import GapRows, MeasuredSequence, find_gap_rows, measure_gaps
 from ..quantity import Quantity
 from .picture_shifts import find_picture_shifts
@@ -89,7 +89,7 @@ def find_camera_pose(sequence: MeasuredSequence) -> CameraPose:
     rows = find_gap_rows(sequence, -np.inf, wall_reach=FARTHEST * radius)
     geometry = measure_gaps(rows, sequence.position, sequence.endpoints, sequence.radius, sequence.side)
     start = np.zeros((len(seen), 2))
-    if sequence.side is None or np.all(sequence.side == STRAIGHT):  # the rods at a circle show no direction
+    if np.all(all_sides(sequence.side, sequence.wall_count) == STRAIGHT):  # the rods at a circle show no direction
         start = find_picture_shifts(rows, geometry, seen, radius)
     bears = geometry.gap + np.einsum("mk,mk->m", geometry.normal, start[rows.frame]) < REACH * radius
     often = np.bincount(rows.pair[bears], minlength=int(rows.pair.max(initial=-1)) + 1) > 0.5 * seen.sum()

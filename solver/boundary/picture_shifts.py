@@ -46,8 +46,7 @@ def find_picture_shifts(rows: GapRows, geometry: GapGeometry, seen: NDArray[np.b
     -----
     The least squares of n_w·t = −g_w over the walls w of a photograph, n_w their mean outward normal and g_w the median
     of the OUTERMOST smallest gaps. It counts up to MOST R where no wall is off by more than CONSISTENT |t| + LEAST R.
-    Photographs
-    without one have that of the nearest photograph.
+    Photographs without one have that of the nearest photograph.
     """
     shifts = np.full((len(seen), 2), np.nan)
     normal, gap, frame = _gaps_of_walls(rows, geometry)

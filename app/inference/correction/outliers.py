@@ -51,10 +51,10 @@ def remove_outliers(
     remark : str
         How many there were; empty where there is none.
     """
-    stays = False if placed is None else placed
-    misplaced = find_misplaced(tracks) & ~np.asarray(stays)
+    free = True if placed is None else ~placed
+    misplaced = find_misplaced(tracks) & free
     tracks = without_poses(tracks, misplaced) if misplaced.any() else tracks
-    outlier = find_outliers(tracks, walls) & ~np.asarray(stays)
+    outlier = find_outliers(tracks, walls) & free
     tracks = without_poses(tracks, outlier) if outlier.any() else tracks
     remarks = (
         _describe(
@@ -65,12 +65,12 @@ def remove_outliers(
     return tracks, "; ".join(filter(None, remarks))
 
 
-def _describe(wrong: NDArray[np.bool_], *reasons: str) -> str:
-    """State how many poses (f, n) count as lost, and why, in the singular and the plural; empty for none."""
+def _describe(wrong: NDArray[np.bool_], reason_of_one: str, reason_of_many: str) -> str:
+    """State how many poses (f, n) count as lost, and why; empty for none."""
     count, frames = int(wrong.sum()), int(wrong.any(axis=1).sum())
     if not count:
         return ""
-    reason, counts = reasons[count > 1], ("it counts", "they count")[count > 1]
+    reason, counts = (reason_of_one, "it counts") if count == 1 else (reason_of_many, "they count")
     poses, photographs = state_count(count, "pose"), state_count(frames, "photograph")
     return f"{poses} in {photographs} {reason}: {counts} as lost; check these rods"
 

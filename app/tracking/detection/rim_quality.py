@@ -8,7 +8,6 @@ from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
 from .detect import Detection, refine_grains
 
-SEEN = 0.2  # fraction of an outline of any radius that is seen, at least
 FEWEST_RIMS = 10  # from which a common error of the radii is read
 # Error of radii by the pixel size that is reported, and that of the place of a rim [px], in blurred pictures too.
 WRONG_SCALE, UNSHARP = 0.01, 0.3
@@ -44,7 +43,7 @@ def refine_given(image: Image, x: Array, y: Array, radius: Array) -> Detection:
 def describe_scale(image: Image, rods: Detection) -> str:
     """State that the rims show other radii than the known ones, which a wrong pixel size does; empty: they agree."""
     free = refine_grains(image, rods.x, rods.y, rods.radius, fixed_radius=False)
-    seen = (free.quality > SEEN) & np.isfinite(free.sigma)
+    seen = (free.quality > FAINT) & np.isfinite(free.sigma)
     if seen.sum() < FEWEST_RIMS:
         return ""
     ratio = float(np.median(free.radius[seen] / rods.radius[seen]))

@@ -7,9 +7,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
-from scipy.spatial import ConvexHull, KDTree
+from scipy.spatial import ConvexHull
 
 from ...experiment.pictures.image import Image
+from ...solver.bodies.disc_pairs import find_disc_pairs
 from ...solver.bodies.grains import Array
 from ...solver.even_subset import even_subset
 
@@ -106,29 +107,23 @@ def find_bars(x: Array, y: Array, radius: Array, count: int = 4) -> Array:
     circles = circles[are_held(x, y, radius)]
     lines = _hull_lines(circles, count)
     for _ in range(ROUNDS):
-        few = [touching for touching in _touching(lines, circles) if 0 < touching.sum() <= FEW]
-        inside = ~np.any(few, axis=0) if few else np.ones(len(circles), np.bool_)
-        moved = _hull_lines(circles[inside], count)
-        # A free surface rests on few circles as well, and on few others below them.
-        if not few or len(moved) != len(lines) or _least(moved, circles) <= _least(lines, circles) + FEW:
+        touching = _touching(lines, circles)
+        number = touching.sum(axis=1)
+        left = circles[~touching[number <= FEW].any(axis=0)]
+        if not (number <= FEW).any() or len(left) < MOST_HELD * len(circles):
             break
-        circles, lines = circles[inside], moved
+        moved = _hull_lines(left, count)
+        # A free surface rests on few circles as well, and on few others below them.
+        if len(moved) != len(lines) or _touching(moved, circles).sum(axis=1).min() <= number.min() + FEW:
+            break
+        circles, lines = left, moved
     return lines
 
 
-def _least(lines: Array, circles: Array) -> int:
-    """Number of circles that touch the line that fewest touch."""
-    return min((int(each.sum()) for each in _touching(lines, circles)), default=0)
-
-
-def _touching(lines: Array, circles: Array) -> list[NDArray[np.bool_]]:
-    """Which circles (n, 3) touch each line (w, 2, 2)."""
-    found = []
-    for start, end in lines:
-        along = (end - start) / np.linalg.norm(end - start)
-        away = np.abs((circles[:, :2] - start) @ np.array([-along[1], along[0]]))
-        found.append(np.abs(away - circles[:, 2]) < NEXT * circles[:, 2].mean())
-    return found
+def _touching(lines: Array, circles: Array) -> NDArray[np.bool_]:
+    """Which circles (n, 3) touch each line (w, 2, 2), as (w, n)."""
+    away = np.array([_distances(line, *circles[:, :2].T) for line in lines]).reshape(-1, len(circles))
+    return np.abs(away - circles[:, 2]) < NEXT * circles[:, 2].mean()
 
 
 def _hull_lines(circles: Array, count: int) -> Array:
@@ -159,19 +154,21 @@ def _hull_lines(circles: Array, count: int) -> Array:
 
 def are_held(x: Array, y: Array, radius: Array) -> NDArray[np.bool_]:
     """Whether each circle (n,) is next to two others or more; all where this is so of few, as in a loose packing."""
-    place, reach = np.column_stack([x, y]), NEXT * float(radius.mean())
-    pairs = KDTree(place).query_pairs(2.0 * float(radius.max()) + reach, output_type="ndarray")
-    gap = np.linalg.norm(place[pairs[:, 1]] - place[pairs[:, 0]], axis=1) - radius[pairs].sum(axis=1)
-    held = np.bincount(pairs[gap < reach].ravel(), minlength=len(x)) >= 2
+    pairs = find_disc_pairs(np.column_stack([x, y]), radius, NEXT * float(radius.mean()))
+    held = np.bincount(pairs.ravel(), minlength=len(x)) >= 2
     return held if held.mean() > MOST_HELD else np.ones(len(x), np.bool_)
 
 
 def depth_in_circles(line: Array, x: Array, y: Array, radius: Array) -> float:
     """Return how far a line (2, 2) reaches into one of n circles at most, over its radius; negative: into none."""
+    return float(np.max(1.0 - _distances(line, x, y) / radius))
+
+
+def _distances(line: Array, x: Array, y: Array) -> Array:
+    """Distances (n,) of places from a line (2, 2) that goes on beyond its ends."""
     along = line[1] - line[0]
     across = np.array([-along[1], along[0]]) / np.hypot(*along)
-    distance = np.abs((np.column_stack([x, y]) - line[0]) @ across)
-    return float(np.max(1.0 - distance / radius))
+    return np.abs((np.column_stack([x, y]) - line[0]) @ across)
 
 
 def lines_to_corners(lines: Array) -> Array:

@@ -123,7 +123,7 @@ def _initialise(folder: Path, draft: Draft, flags: SetupFlags, video: list[str])
         selection = replace(selection, channel=view.channel)  # type: ignore[arg-type]
         first = selection.cut(_first(photographs, selection))
         detection, classes = _in_classes(first, view, detection, flags, _without_errors(draft, "photographs", "scale"))
-        found, notes = _find_rods_and_walls(draft, flags, first, detection)
+        found, detection, notes = _find_rods_and_walls(draft, flags, first, detection)
         follow, how = _choose_follow(photographs, flags, selection, view, found)
         keys = {"photographs.channel": view.channel if view.channel != "grey" else None, "photographs.follow": follow}
         draft.set_keys("channel and following", {key: value for key, value in keys.items() if value is not None})
@@ -214,10 +214,7 @@ def _detect(
 def _in_classes(
     first: Image, view: View, detection: Detection, flags: SetupFlags, found: ValidationResult
 ) -> tuple[Detection, list[str]]:
-    """Detect rods of a few sizes once more with these sizes; also a sentence on them.
-
-    A rim that glare or paint interrupts is then found at its place, and not as a smaller circle beside it.
-    """
+    """Detect rods of a few sizes once more with these, so that interrupted rims are found; also a sentence on them."""
     sizes = None if flags.radii or flags.grains is not None else edits.evident_classes(detection.radius)
     if sizes is None or found.scale is None:
         return detection, []
@@ -227,7 +224,7 @@ def _in_classes(
         return detection, []
     listed = ", ".join(f"{1e3 * size * found.scale.mean_size:.4g}" for size in sizes)
     many = f"{len(sizes)} sizes" if len(sizes) > 1 else "one size"
-    return again, [f"The rods have {many}, radius {listed} mm in the photograph: all are set to it. Better: --radii."]
+    return again, [f"The rods have {many}, radius {listed} mm in the photograph, which is used. Better: --radii."]
 
 
 def _without_video(folder: Path, flags: SetupFlags, on_failure: ExitStack) -> tuple[SetupFlags, list[str]]:
@@ -280,14 +277,14 @@ def _replace_plain_bars(
     first, second = (selection.cut(read_photograph(file, channel=selection.channel)) for file in photographs.files[:2])
     radius = float(rods.radius.mean()) * scale.mean_size
     seen = can_be_followed((first, second), walls.endpoints[0], scale, radius)
+    if seen.all():
+        return []
     named = list(zip(walls.name, scale.to_pixels(walls.endpoints[0]), strict=True))
-    barred = np.array([name in flags.pressure or edits.shows_edge(first, line, rods) for name, line in named])
+    barred = seen | [name in flags.pressure or edits.shows_edge(first, line, rods) for name, line in named]
     if not barred.all() and barred.sum() >= FEWEST_BARS and seen[barred].all():
         edits.set_walls(draft, found, [named[w] for w in np.flatnonzero(barred)], "sides without a bar left out")
         names = ", ".join(repr(named[w][0]) for w in np.flatnonzero(~barred))
         return [f"No bar is seen at {names}: the packing is open there. Draw it by rodsight open if there is one."]
-    if seen.all():
-        return []
     names = ", ".join(repr(name) for name, here in zip(walls.name, seen, strict=True) if not here)
     fact = f"Bars {names} show nothing by which they could be followed to the second photograph"
     if flags.pressure:
@@ -342,14 +339,14 @@ def add_discs(draft: Draft, found: ValidationResult, discs: Sequence[circles.Cir
 
 def _find_rods_and_walls(
     draft: Draft, flags: SetupFlags, first: Image, detection: Detection
-) -> tuple[ValidationResult, list[str]]:
-    """Set the rods, find the walls, and set the pressures; also return sentences on walls that were left out."""
+) -> tuple[ValidationResult, Detection, list[str]]:
+    """Set rods, walls and pressures; also return the rods, and sentences on what was left out."""
     notes: list[str] = []
     edits.set_rods(draft, "rods", edits.as_guess(detection), flags.radii)
     if flags.walls == NONE:
         if flags.pressure:
             raise InputError("--pressure", next(iter(flags.pressure)), "loads a wall, but there are none: --walls none")
-        return validate(draft), notes
+        return validate(draft), detection, notes
     if flags.walls == FOUND:
         found = validate(draft)
         lines = edits.find_walls(first, found)
@@ -365,11 +362,12 @@ def _find_rods_and_walls(
                 f"Wall {name!r} is left out, since it would cut through {state_count(count, 'rod')}."
                 for name, count in cut.items()
             ]
-        inside = edits.within_walls(detection, found)
-        if inside.count < detection.count:
-            edits.set_rods(draft, "circles beyond the bars left out", edits.as_guess(inside), flags.radii)
+        count = detection.count
+        detection = edits.within_walls(detection, found) if flags.grains is None else detection
+        if detection.count < count:
+            edits.set_rods(draft, "circles beyond the bars left out", edits.as_guess(detection), flags.radii)
             found = validate(draft)
-            notes.append(f"{state_count(detection.count - inside.count, 'circle')} beyond the bars left out: no rods.")
+            notes.append(f"{state_count(count - detection.count, 'circle')} beyond the bars left out: no rods.")
         find_discs(draft, first, found)
         wrong = validate(draft).steps["walls"].errors
         if wrong and not flags.pressure:  # rods that stand in no frame of four bars, or circles that are no rods
@@ -388,7 +386,7 @@ def _find_rods_and_walls(
             there = ", ".join(found.walls.name)
             raise InputError("--pressure", f"{wall}={pressure:g}", f"there is no such wall; there are {there}")
         edits.set_plate(draft, found, wall, {"pressure": pressure})
-    return _without_errors(draft, *validate(draft).steps), notes
+    return _without_errors(draft, *validate(draft).steps), detection, notes
 
 
 def _without_errors(draft: Draft, *steps: str) -> ValidationResult:

@@ -295,12 +295,13 @@ def test_radii_that_the_rims_contradict_are_reported(tmp_path, capsys, radius, s
 
 
 @pytest.mark.thorough
-def test_a_side_without_a_bar_leaves_the_others(folder, monkeypatch, capsys):
+@pytest.mark.parametrize("followed", [False, True])
+def test_a_side_without_a_bar_leaves_the_others(folder, monkeypatch, capsys, followed):
     def shows_edge(image, line, rods):
         return bool(line[:, 1].mean() > 0.2 * image.shape[0])  # not at the top
 
     def can_be_followed(images, ends, *_):
-        return ends[:, :, 1].mean(axis=1) < 0.9 * ends[:, :, 1].max()
+        return followed | (ends[:, :, 1].mean(axis=1) < 0.9 * ends[:, :, 1].max())
 
     monkeypatch.setattr(edits, "shows_edge", shows_edge)
     monkeypatch.setattr(initialise, "can_be_followed", can_be_followed)
@@ -315,6 +316,7 @@ def test_a_side_without_a_bar_leaves_the_others(folder, monkeypatch, capsys):
         "0.007,0.008,0.011",
     )
     assert rodsight("init", folder, *flags) == 0
-    assert "No bar is seen at 'top'" in " ".join(capsys.readouterr().out.split())
+    # Paint that can be followed is a bar, whether its edge is seen or not.
+    assert ("No bar is seen at 'top'" in " ".join(capsys.readouterr().out.split())) != followed
     rows = (folder / "walls.csv").read_text().splitlines()[1:]
-    assert sorted({row.split(",")[1] for row in rows}) == ["bottom", "left", "right"]
+    assert sorted({row.split(",")[1] for row in rows}) == ["bottom", "left", "right", *["top"] * followed]

@@ -121,7 +121,7 @@ MUTANTS = [
         "app/tracking/walls/inner_edge.py",
         "tests/app/tracking/walls/test_inner_edge.py",
         ("minlength=len(x)) >= 2", "minlength=len(x)) >= 0"),
-        ("if 0 < touching.sum() <= FEW", "if touching.sum() < 0"),
+        ("left = circles[~touching[number <= FEW].any(axis=0)]", "left = circles"),
         ("if held.mean() > MOST_HELD", "if True"),
     ),
     *mutants_of(
@@ -146,7 +146,7 @@ MUTANTS = [
         "solver/boundary/camera_pose.py",
         "tests/solver/boundary/test_boundary.py",
         ("np.median((pose - start)[fitted], axis=0)", "np.median(pose[fitted], axis=0)"),
-        ("np.all(sequence.side == STRAIGHT)", "True"),
+        ("np.all(all_sides(sequence.side, sequence.wall_count) == STRAIGHT)", "True"),
     ),
     *mutants_of(
         "solver/boundary/exchanged_sizes.py",

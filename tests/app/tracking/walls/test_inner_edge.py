@@ -91,3 +91,9 @@ def test_a_loose_packing_is_bounded_with_all_its_circles():
         pytest.approx(-20.0, abs=0.05),
         pytest.approx(320.0, abs=0.05),
     )
+
+
+def test_a_ring_of_few_circles_is_bounded():
+    angle = 2.0 * np.pi * np.arange(6) / 6
+    x, y = 100.0 + 40.0 * np.cos(angle), 100.0 + 40.0 * np.sin(angle)  # every line rests on two of them
+    assert len(find_bars(x, y, np.full(6, 20.0))) == 4
