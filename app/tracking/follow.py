@@ -8,7 +8,7 @@ error of the program is no failure of a photograph: it is raised.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +30,8 @@ from .registration.manual_poses import ManualPoses
 from .registration.poses import FramePoses, no_poses
 from .settings import TrackingSettings
 from .tracker import Tracker
+from .walls.edge_tracker import EdgePoses, EdgeTracker
+from .walls.texture_or_edge import BarMotion, texture_or_edge
 from .walls.wall_tracker import WallPoses, WallTracker
 
 AnyTracker = Tracker | OutlineTracker
@@ -72,16 +74,6 @@ class Execution:
     checkpoint: Checkpoint
     progress: Progress = no_progress
     pictures: Checkpoint | None = None  # for the JPEG copies of photographs
-
-
-@dataclass(frozen=True, slots=True)
-class FollowedWalls:
-    """The walls of f frames and the accuracy of their positions."""
-
-    walls: WallTracks
-    sigma: Array  # (f, w, 2) [m] of each endpoint along the normal, against frame 0; NaN where the table gives it
-    zncc: Array  # (f, w) NaN where the table gives the wall
-    patches: NDArray[np.int64]  # (f, w) number of patches that agree
 
 
 def follow_photographs(
@@ -171,7 +163,7 @@ def _renew(tracker: AnyTracker, photographs: Photographs, poses: list[FramePoses
         tracker.renew(rows, len(poses) - 1, photographs[len(poses) - 1], poses[-1])
 
 
-def follow_walls(series: Series, walls: WallTracks, depth: Array, execution: Execution, source: Path) -> FollowedWalls:
+def follow_walls(series: Series, walls: WallTracks, depth: Array, execution: Execution, source: Path) -> BarMotion:
     """Track the walls where their endpoints are NaN.
 
     Parameters
@@ -189,47 +181,52 @@ def follow_walls(series: Series, walls: WallTracks, depth: Array, execution: Exe
 
     Returns
     -------
-    FollowedWalls
-        Endpoints are NaN where a wall is not found.
+    BarMotion
+        Endpoints are NaN where a wall is not found; standard deviations where a table gives it.
 
     Raises
     ------
     InputError
-        If a wall has no texture.
+        If a wall shows neither a texture nor an edge.
     """
     photographs, checkpoint, progress = series.photographs, execution.checkpoint, execution.progress
     frame_count = len(walls.endpoints)
     tracker = WallTracker(photographs[0], walls.endpoints[0], series.scale, depth, workers=execution.workers)
+    edge_tracker = EdgeTracker(photographs[0], walls.endpoints[0], series.scale)
     followed = np.asarray(np.isnan(walls.endpoints).any(axis=(2, 3)), dtype=np.bool_)
-    for w in np.flatnonzero(followed.any(axis=0) & (tracker.patch_count < tracker.settings.min_patches)):
+    blank = (tracker.patch_count < tracker.settings.min_patches) & ~edge_tracker.seen
+    for w in np.flatnonzero(followed.any(axis=0) & blank):
         raise InputError(
             source,
             f"frame 0, wall {walls.name[w]!r}",
-            f"shows {tracker.patch_count[w]} patches of texture within {depth[w] * 1e3:.3g} mm on the right of 1 → 2: "
-            "too few to be followed; give its position in every frame",
+            f"shows {tracker.patch_count[w]} patches of texture within {depth[w] * 1e3:.3g} mm on the right of 1 → 2, "
+            "and no edge: too little to be followed; give its position in every frame",
         )
-    poses: list[WallPoses] = [checkpoint.load(k, WallPoses)[0] for k in range(min(checkpoint.finished(), frame_count))]
+    finished = [checkpoint.load(k, WallPoses, EdgePoses) for k in range(min(checkpoint.finished(), frame_count))]
+    poses: list[WallPoses] = [texture for texture, _ in finished]
+    edges: list[EdgePoses] = [edge for _, edge in finished]
     with PrefetchedPhotographs(photographs, frame_count) as coming:
         for k in range(len(poses), frame_count):
             progress("walls", k, frame_count)
             image = coming[k]
             pose = tracker.first() if k == 0 else tracker.follow(image, poses[-HISTORY:])
-            pose = _replace_given(pose, walls.endpoints[k], ~followed[k])
-            checkpoint.save(k, pose)
+            edge = edge_tracker.first() if k == 0 else edge_tracker.follow(image, edges[-HISTORY:])
+            pose, edge = _replace_given(pose, edge, walls.endpoints[k], ~followed[k])
+            checkpoint.save(k, pose, edge)
             poses.append(pose)
+            edges.append(edge)
     progress("walls", frame_count, frame_count)
-    return FollowedWalls(
-        replace(walls, endpoints=np.stack([p.endpoints for p in poses])),
-        np.stack([p.sigma for p in poses]),
-        np.stack([p.zncc for p in poses]),
-        np.stack([p.patches for p in poses]),
-    )
+    return texture_or_edge(poses, edges, ~followed, tracker.lined, series.scale.mean_size)
 
 
-def _replace_given(pose: WallPoses, endpoints: Array, given: NDArray[np.bool_]) -> WallPoses:
-    return WallPoses(
-        np.where(given[:, None, None], endpoints, pose.endpoints),
-        np.where(given[:, None], np.nan, pose.sigma),
-        np.where(given, np.nan, pose.zncc),
-        np.where(given, 0, pose.patches),
-    )
+def _replace_given(
+    pose: WallPoses, edge: EdgePoses, endpoints: Array, given: NDArray[np.bool_]
+) -> tuple[WallPoses, EdgePoses]:
+    here, end = given[:, None, None], given[:, None]
+    return (
+        WallPoses(
+            np.where(here, endpoints, pose.endpoints), np.where(end, np.nan, pose.sigma),
+            np.where(given, np.nan, pose.zncc), np.where(given, 0, pose.patches),
+        ),
+        EdgePoses(np.where(here, endpoints, edge.endpoints), np.where(end, np.nan, edge.sigma), edge.fraction),
+    )  # fmt: skip

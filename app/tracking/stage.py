@@ -35,7 +35,7 @@ from .detection.channels import count_clear, count_discs, is_coloured
 from .detection.detect import Detection, DetectionSettings
 from .detection.false_detections import describe_channels, describe_false_detections
 from .detection.rim_quality import refine_given
-from .follow import Execution, FollowedWalls, ReferenceGrains, Series, follow_photographs, follow_walls
+from .follow import Execution, ReferenceGrains, Series, follow_photographs, follow_walls
 from .fringes import measure_fringes
 from .missed_rods import detect_rods
 from .outline.missing_discs import add_missing_discs
@@ -43,6 +43,7 @@ from .registration.manual_poses import ManualPoses
 from .report.page import TrackingReportData
 from .settings import TrackingSettings
 from .walls.bar_depth import MAX_BAR_DEPTH, visible_depth
+from .walls.texture_or_edge import BarMotion
 
 Columns = dict[str, NDArray[Any]]
 
@@ -127,10 +128,10 @@ def track_photographs(
             )  # fmt: skip
             endpoints = walls.endpoints.copy()
             sigma = np.full(walls.endpoints.shape[:2], np.nan) if walls.sigma is None else walls.sigma.copy()
-            endpoints[:, straight] = followed.walls.endpoints
+            endpoints[:, straight] = followed.endpoints
             sigma[:, straight] = np.sqrt((followed.sigma**2).mean(axis=2))
             walls = replace(walls, endpoints=endpoints, sigma=sigma)
-            tables[WALLS] = _walls_table(followed)
+            tables[WALLS] = _walls_table(bars.name, followed)
         missing_walls = _missing_walls_by_frame(walls, photographs)
     tracks = follow_photographs(
         series, grains, Execution(workers, keep("tracking"), progress, keep(PICTURES)),
@@ -319,17 +320,18 @@ def _missing_walls_by_frame(walls: WallTracks, photographs: Photographs) -> dict
     }
 
 
-def _walls_table(followed: FollowedWalls) -> Columns:
+def _walls_table(names: Sequence[str], followed: BarMotion) -> Columns:
     f, w = followed.zncc.shape
-    ends = followed.walls.endpoints.reshape(f * w, 4)
+    ends = followed.endpoints.reshape(f * w, 4)
     columns: Columns = {
         "frame": np.repeat(np.arange(f), w),
-        "wall": np.tile(np.array(followed.walls.name), f),
+        "wall": np.tile(np.array(names), f),
         **{name: ends[:, k] for k, name in enumerate(("x1", "y1", "x2", "y2"))},
         "sigma1": followed.sigma[..., 0].ravel(),
         "sigma2": followed.sigma[..., 1].ravel(),
         "zncc": followed.zncc.ravel(),
         "patches": followed.patches.ravel(),
+        "edge": np.round(followed.edge, 3).ravel(),
     }
     found = np.isfinite(ends).all(axis=1)
     return {name: values[found] for name, values in columns.items()}

@@ -8,8 +8,10 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
-from .inner_edge import BLUR, MIN_WINDOW, OUTLIER, PASSES, SPACING, STEP, subpixel_peak
+from .inner_edge import BLUR, OUTLIER, SPACING, STEP, subpixel_peak
 
+PASSES = 6  # of the robust fit
+MIN_WINDOW = 1.0  # [px] half width of the last searches
 TRIPLES = 300  # circles through three edges, of which the one with most agreement is the first estimate
 MIN_PROFILES = 12  # profiles that must contain an edge
 STRONG_FRACTION = 0.3  # least slope of an edge, as a fraction of the strongest slopes

@@ -22,6 +22,8 @@ from ..correlation.patches import Patches
 from ..correlation.splines import Pyramid
 from .rigid_motion import fit_common_motion, rotate
 
+MOST_LINED = 10.0  # variance of a patch's place along its bar, over that across it; of dots it is about 1
+
 
 @dataclass(frozen=True, slots=True)
 class WallSettings:
@@ -100,6 +102,18 @@ class WallTracker:
     def patch_count(self) -> NDArray[np.int64]:
         """Number of usable patches of every wall (w,)."""
         return np.bincount(self.wall[self.patches.usable], minlength=self.wall_count)
+
+    @property
+    def lined(self) -> NDArray[np.bool_]:
+        """Which walls (w,) show lines along them only: the edge of a thin bar, or traces of its brushing."""
+        inverse = np.nan_to_num(self.patches.hessian_inverse[:, :2, :2])
+        ends = self.scale.to_pixels(self.endpoints)
+        along = (ends[:, 1] - ends[:, 0])[self.wall]
+        across = np.stack([along[:, 1], -along[:, 0]], axis=1)
+        variance, least = (np.einsum("pi,pij,pj->p", each, inverse, each) for each in (along, across))
+        textured = self.patches.usable & (variance < MOST_LINED * least)
+        count = np.bincount(self.wall[textured], minlength=self.wall_count)
+        return np.asarray((count < self.settings.min_patches) & (self.patch_count >= self.settings.min_patches))
 
     def first(self) -> WallPoses:
         """Return the walls on the reference itself."""

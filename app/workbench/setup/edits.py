@@ -24,7 +24,8 @@ from ...tracking.detection.clicked_circle import fit_clicked
 from ...tracking.detection.detect import Detection, DetectionSettings
 from ...tracking.detection.scale_comparison import find_other_scale, packed_fraction
 from ...tracking.missed_rods import detect_rods
-from ...tracking.walls.inner_edge import depth_in_circles, find_bars, lines_to_corners, snap_to_edge
+from ...tracking.walls.inner_edge import find_edge
+from ...tracking.walls.surrounding_bars import depth_in_circles, find_bars, lines_to_corners
 from .circles import arcs_table, circles_of, moved_corners, renamed
 from .draft import Draft, as_table
 from .validation import ValidationResult, validate
@@ -43,7 +44,6 @@ TOUCHES = 0.08  # radii between the edge of a bar and the rod next to it; else i
 NEARLY_ALL, FEWEST_EVIDENT, EVIDENT, MOST_EVIDENT = 0.85, 20, 0.015, 5
 RARE = 0.08  # fraction of the rods that no class has
 SNAP = 0.6  # radii from the line that bounds the rods to the edge of a bar, at most
-SEEN = 0.34  # fraction of the profiles across a line that must show the edge
 NAMES = ("bottom", "right", "top", "left")
 # Densities [kg/m³] and textbook friction coefficients of dry, clean rods: initial values.
 MATERIALS: dict[str, dict[str, float]] = {
@@ -157,8 +157,8 @@ def snap_wall(image: Image, line: Array, found: ValidationResult) -> tuple[Array
     """
     line = towards_packing(line, found)
     length = float(np.linalg.norm(line[1] - line[0]))
-    snapped, fraction = snap_to_edge(image, line, min(max(0.03 * length, 8.0), 40.0))
-    return (snapped, fraction) if fraction >= SEEN else (line, fraction)
+    edge = find_edge(image, line, min(max(0.03 * length, 8.0), 40.0))
+    return edge.line if edge.is_seen else line, edge.fraction
 
 
 def towards_packing(line: Array, found: ValidationResult) -> Array:
@@ -180,17 +180,17 @@ def find_walls(image: Image, found: ValidationResult) -> Array:
             GRAINS, "", "holds too few rods to find bars around them: detect the rods first, or draw the bars"
         )
     lines = find_bars(rods.x, rods.y, rods.radius)
-    snapped = [snap_to_edge(image, line, SNAP * float(np.median(rods.radius))) for line in lines]
+    edges = [find_edge(image, line, SNAP * float(np.median(rods.radius))) for line in lines]
     chosen = [
-        moved if fraction >= SEEN and abs(depth_in_circles(moved, rods.x, rods.y, rods.radius)) < TOUCHES else line
-        for line, (moved, fraction) in zip(lines, snapped, strict=True)
+        edge.line if edge.is_seen and abs(depth_in_circles(edge.line, rods.x, rods.y, rods.radius)) < TOUCHES else line
+        for line, edge in zip(lines, edges, strict=True)
     ]
     return lines_to_corners(np.array(chosen))
 
 
 def shows_edge(image: Image, line: Array, rods: GrainGuess) -> bool:
     """Whether the edge of a bar is seen along a line (2, 2) [px]."""
-    return snap_to_edge(image, line, SNAP * float(np.median(rods.radius)))[1] >= SEEN
+    return find_edge(image, line, SNAP * float(np.median(rods.radius))).is_seen
 
 
 def names_of(lines: Array) -> tuple[str, ...]:

@@ -128,7 +128,7 @@ def _initialise(folder: Path, draft: Draft, flags: SetupFlags, video: list[str])
         keys = {"photographs.channel": view.channel if view.channel != "grey" else None, "photographs.follow": follow}
         draft.set_keys("channel and following", {key: value for key, value in keys.items() if value is not None})
         found = _without_errors(draft, "photographs")
-        plain = _replace_plain_bars(draft, flags, photographs, selection, found)
+        plain, followed = _replace_plain_bars(draft, flags, photographs, selection, found)
         found = _without_errors(draft, "photographs")
         write_atomically(folder / PICTURE, draw_setup(_first(photographs, selection), found))
         faint = [] if flags.grains is not None else [describe_faint_rims(detection)]
@@ -137,6 +137,7 @@ def _initialise(folder: Path, draft: Draft, flags: SetupFlags, video: list[str])
             "rods": [*left_out, *classes, *how, *faint], "walls": [*notes, *plain],
         }  # fmt: skip
     found.steps["rods"].messages += remarks  # of what is seen, which is no reason to look again
+    found.steps["walls"].messages += followed
     for step, sentence in ((step, each) for step, several in stated.items() for each in several if each):
         found.steps[step].add_warning(sentence)
     if flags.interval is None:
@@ -267,30 +268,31 @@ def _choose_follow(
 
 def _replace_plain_bars(
     draft: Draft, flags: SetupFlags, photographs: Photographs, selection: ImageSelection, found: ValidationResult
-) -> list[str]:
-    """Impose the motion of the outermost rods where found bars cannot be followed; return a sentence on it."""
+) -> tuple[list[str], list[str]]:
+    """Impose the motion of the outermost rods where found bars cannot be followed; return warnings, and remarks."""
     walls, scale, rods = found.walls, found.scale, found.rods
     if flags.walls != FOUND or len(photographs) < 2 or walls is None or scale is None or rods is None:
-        return []
+        return [], []
     if (walls.sides != STRAIGHT).any():  # bars follow the discs in their corners
-        return []
+        return [], []
     first, second = (selection.cut(read_photograph(file, channel=selection.channel)) for file in photographs.files[:2])
     radius = float(rods.radius.mean()) * scale.mean_size
-    seen = can_be_followed((first, second), walls.endpoints[0], scale, radius)
-    if seen.all():
-        return []
+    texture, edge = can_be_followed((first, second), walls.endpoints[0], scale, radius)
+    if (seen := texture | edge).all():
+        names = ", ".join(repr(walls.name[w]) for w in np.flatnonzero(~texture))
+        return [], [f"Bars without paint are followed by their edges: {names}."] if names else []
     named = list(zip(walls.name, scale.to_pixels(walls.endpoints[0]), strict=True))
     barred = seen | [name in flags.pressure or edits.shows_edge(first, line, rods) for name, line in named]
     if not barred.all() and barred.sum() >= FEWEST_BARS and seen[barred].all():
         edits.set_walls(draft, found, [named[w] for w in np.flatnonzero(barred)], "sides without a bar left out")
         names = ", ".join(repr(named[w][0]) for w in np.flatnonzero(~barred))
-        return [f"No bar is seen at {names}: the packing is open there. Draw it by rodsight open if there is one."]
-    names = ", ".join(repr(name) for name, here in zip(walls.name, seen, strict=True) if not here)
+        return [f"No bar is seen at {names}: the packing is open there. Draw it by rodsight open if there is one."], []
+    names = ", ".join(repr(walls.name[w]) for w in np.flatnonzero(~seen))
     fact = f"Bars {names} show nothing by which they could be followed to the second photograph"
     if flags.pressure:
-        return [f"{fact}: give the ends of all bars in every photograph in walls.csv, or [walls] track = false."]
+        return [f"{fact}: give the ends of all bars in every photograph in walls.csv, or [walls] track = false."], []
     instead = _impose_outer_rods(draft, found)
-    return [f"{fact}: {instead} If they are at rest, draw them by rodsight open and set [walls] track = false."]
+    return [f"{fact}: {instead} If they are at rest, draw them by rodsight open and set [walls] track = false."], []
 
 
 def _impose_outer_rods(draft: Draft, found: ValidationResult) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from rodsight.experiment.experiment import GrainGuess
 from rodsight.tracking.detection.clicked_circle import fit_clicked
+from rodsight.tracking.walls.inner_edge import Edge
 from rodsight.workbench.setup import edits
 from rodsight.workbench.setup.edits import fit_rod
 
@@ -51,9 +52,9 @@ def test_edges_that_no_rod_touches_or_that_cut_rods_are_no_walls(monkeypatch):
     def snap(image, line, reach):
         along = line[1] - line[0]
         outward = np.array([-along[1], along[0]]) / np.hypot(*along)
-        return line + next(shift) * outward, 1.0
+        return Edge(line + next(shift) * outward, 1.0, np.full(2, 0.1), 100.0)
 
-    monkeypatch.setattr(edits, "snap_to_edge", snap)
+    monkeypatch.setattr(edits, "find_edge", snap)
     lines = edits.find_walls(np.zeros((130, 150), np.float32), found)
     sides = np.array([float(np.mean(lines[w, :, 1 - w % 2])) for w in range(4)])
     assert np.abs(sides - [100.0, 120.0, 20.0, 20.0]) == pytest.approx([0.5, 0.0, 0.0, 0.5], abs=0.05)

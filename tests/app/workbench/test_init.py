@@ -123,7 +123,7 @@ def test_walls_that_cut_through_rods_are_left_out_and_named(tmp_path, capsys, mo
         [[20.0, 18.0], [150.0, 262.0]],
     ])  # fmt: skip
     monkeypatch.setattr("rodsight.workbench.setup.edits.find_walls", lambda *_: lines)
-    monkeypatch.setattr("rodsight.workbench.setup.initialise.can_be_followed", lambda _, ends, *__: ends[:, 0, 0] > -1)
+    monkeypatch.setattr(initialise, "can_be_followed", lambda _, ends, *__: 2 * (ends[:, 0, 0] > -1,))
     flags = ("--photographs", "shots/*.png", "--interval", 5, "--pixel-size", 1e-4, "--channel", "red")
     assert rodsight("init", tmp_path, *flags, "--radius-range", "18:30") == 0
     printed = capsys.readouterr().out.replace("\n", " ")
@@ -301,7 +301,7 @@ def test_a_side_without_a_bar_leaves_the_others(folder, monkeypatch, capsys, fol
         return bool(line[:, 1].mean() > 0.2 * image.shape[0])  # not at the top
 
     def can_be_followed(images, ends, *_):
-        return followed | (ends[:, :, 1].mean(axis=1) < 0.9 * ends[:, :, 1].max())
+        return 2 * (followed | (ends[:, :, 1].mean(axis=1) < 0.9 * ends[:, :, 1].max()),)
 
     monkeypatch.setattr(edits, "shows_edge", shows_edge)
     monkeypatch.setattr(initialise, "can_be_followed", can_be_followed)

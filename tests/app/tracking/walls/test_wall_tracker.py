@@ -25,9 +25,11 @@ BARS = PIXEL_SIZE * np.array(
 RODS = PIXEL_SIZE * np.array([[150.0, 92.0], [260.0, 92.0], [250.0, 300.0], [407.0, 200.0]])
 
 
-def photograph(bars: np.ndarray, noise_seed: int, rods: np.ndarray = RODS) -> np.ndarray:
+def photograph(
+    bars: np.ndarray, noise_seed: int, rods: np.ndarray = RODS, settings: SpeckleSettings = SETTINGS
+) -> np.ndarray:
     return render_photograph(
-        SETTINGS,
+        settings,
         RodScene(
             width=WIDTH,
             height=HEIGHT,
@@ -192,3 +194,11 @@ def test_sample_bars_agree_with_their_table() -> None:
     for k in range(1, len(photographs)):
         history.append(tracker.follow(photographs[k], history[-8:]))
         assert np.abs(normal_error(history[-1].endpoints, walls.endpoints[k])).max() < NORMAL_ALLOWED
+
+
+def test_a_thin_bar_shows_a_line_that_does_not_show_the_motion_along_it(tracker: WallTracker) -> None:
+    thin = replace(SETTINGS, bar_coverage=0.0, bar_thickness=0.0015)
+    image = photograph(BARS, 1, settings=thin)
+    lines = WallTracker(image, BARS, SCALE, visible_depth(image, BARS, SCALE, 0.02))
+    assert lines.lined.all()
+    assert not tracker.lined.any()
