@@ -35,7 +35,10 @@ MUTANTS = [
     *mutants_of(
         "solver/mixture/equilibrium_projection.py",
         f"{TESTS}/test_equilibrium_projection.py",
-        ("fn) <= MAX_CHANGE * sd:", "fn) <= 0.0 * sd:"),
+        ("(change <= MAX_CHANGE * sd or balanced)", "balanced"),
+        ("not soft and change <= MAX_CHANGE_BALANCED", "change <= MAX_CHANGE_BALANCED"),
+        ("change <= MAX_CHANGE_BALANCED * sd and ", ""),
+        (" and _residual(balance, found) <= MAX_RESIDUAL", ""),
         ("price = factor * settings.balance", "price = settings.balance / factor"),
         ("fn) <= limit * sd:", "fn) <= 0.0 * sd:"),
         ("MAX_CHANGE_SOFT if soft else", "MAX_CHANGE_RELAXED if soft else"),

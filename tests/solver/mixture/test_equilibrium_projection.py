@@ -15,6 +15,7 @@ from rodsight.solver.convex.program import (
 from rodsight.solver.mixture import equilibrium_projection
 from rodsight.solver.mixture.equilibrium_projection import (
     MAX_CHANGE,
+    MAX_CHANGE_BALANCED,
     MAX_CHANGE_RELAXED,
     MAX_CHANGE_SOFT,
     RELAXATION,
@@ -83,8 +84,26 @@ def test_change_of_few_standard_deviations_is_no_missing_pair():
     strict = project_onto_equilibrium(balance, fn, ft)
     fn_sd = np.full(len(fn), 1.2 * np.sqrt(np.mean((strict.fn - fn) ** 2)) / MAX_CHANGE)
     np.testing.assert_array_equal(project_mixed_field(balance, fn, ft, fn_sd, ConvexSettings()).fn, strict.fn)
-    certain = project_mixed_field(balance, fn, ft, fn_sd / 2.0, ConvexSettings())
+    certain = project_mixed_field(balance, fn, ft, fn_sd / 4.0, ConvexSettings())
     assert change(certain, fn, fn_sd) < change(strict, fn, fn_sd)
+
+
+def test_hard_grains_that_all_find_balance_may_change_by_more(monkeypatch):
+    fn, ft, balance = lattice()
+    noisy = fn * (1 + 0.3 * np.random.default_rng(5).normal(size=len(fn)))
+    strict = project_onto_equilibrium(balance, noisy, ft)
+    size = np.sqrt(np.mean((strict.fn - noisy) ** 2))
+
+    def project(changed, *, soft=False):
+        fn_sd = np.full(len(fn), size / changed)
+        return project_mixed_field(balance, noisy, ft, fn_sd, ConvexSettings(), soft=soft).fn
+
+    between = 0.5 * (MAX_CHANGE + MAX_CHANGE_BALANCED)
+    np.testing.assert_array_equal(project(between), strict.fn)
+    assert np.abs(project(between, soft=True) - strict.fn).max() > 0.0
+    assert np.abs(project(1.1 * MAX_CHANGE_BALANCED) - strict.fn).max() > 0.0
+    monkeypatch.setattr(equilibrium_projection, "MAX_RESIDUAL", 1e-9)  # no residual is that small
+    assert np.abs(project(between) - strict.fn).max() > 0.0
 
 
 def test_equilibrium_is_relaxed_no_further_than_necessary(monkeypatch):
@@ -95,7 +114,8 @@ def test_equilibrium_is_relaxed_no_further_than_necessary(monkeypatch):
     ]
     size = [np.sqrt(np.mean((each - fn) ** 2)) for each in relaxed]
     assert size == sorted(size, reverse=True)
-    monkeypatch.setattr(equilibrium_projection, "MAX_CHANGE", 0.0)  # strict equilibrium is never accepted
+    for name in ("MAX_CHANGE", "MAX_CHANGE_BALANCED"):
+        monkeypatch.setattr(equilibrium_projection, name, 0.0)  # strict equilibrium is never accepted
     fn_sd = np.full(len(fn), 1.01 * size[2] / MAX_CHANGE_RELAXED)
     found = project_mixed_field(balance, fn, ft, fn_sd, ConvexSettings())
     np.testing.assert_array_equal(found.fn, relaxed[2])
