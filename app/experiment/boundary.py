@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 
 from ..process.errors import InputError
 from ..solver.bodies.cell import Cell, unwrap
-from ..solver.bodies.outer_grains import FreeSurface, find_outer_grains
+from ..solver.bodies.outer_grains import SIDES, FreeSurface, find_outer_grains
 from ..solver.bodies.walls import Walls
 from ..tracks import Tracks, WallTracks
 from .coincident_rods import refuse_coincident_rods
@@ -19,11 +19,9 @@ from .config.input_sections import OUTER
 from .experiment import Experiment, rows_of
 from .reading.tables import Table, check_unique
 
-SIDES = ("at the top", "at the bottom", "at the right", "at the left")
 # Rods are sought in the first photograph alone.
 HIDDEN = "; if the first photograph hides rods there, as a hand before them does, begin with a later one: --frames 1:"
 FACING_UP = 0.1  # a surface with a larger cosine to the direction opposite to gravity may be free
-FEWEST_BARE = 4  # unbounded gaps between outer grains: fewer are a missing rod beside a wall
 WIDEST = 2.0  # largest diameters: a cell must be higher, so that a pair touches in at most one of its images
 
 
@@ -75,15 +73,9 @@ def free_surfaces(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> 
         bare = surface.outward @ (up / np.linalg.norm(up)) < FACING_UP
     if tracks.boundary is not None:
         bare &= ~_near_boundary(tracks, surface)
-    side = np.argmax(surface.outward @ np.array([[0.0, 0.0, 1.0, -1.0], [1.0, -1.0, 0.0, 0.0]]), axis=1)
-    place = np.where(surface.inner, len(SIDES), side)
     sentences = []
-    for k, name in enumerate((*SIDES, "around a hole inside")):
-        here = bare & (place == k)
-        if np.count_nonzero(here) < FEWEST_BARE:
-            continue
-        x, y = surface.place[here].mean(axis=0)
-        more = HIDDEN if k == len(SIDES) and experiment.config.photographs is not None else ""
+    for name, (x, y) in surface.sides(bare):
+        more = HIDDEN if name == SIDES[-1] and experiment.config.photographs is not None else ""
         sentences.append(
             f"The packing has a free surface {name}, near x = {x:.3g} m, y = {y:.3g} m, with neither wall nor boundary "
             "there: if something holds these rods, give it by [walls], or impose their measured motion by "

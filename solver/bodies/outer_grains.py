@@ -9,6 +9,7 @@ is wide enough, or if it touches the third grain of the triangle from there.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -22,6 +23,16 @@ from .walls import Walls
 DISC_FRACTION = 0.97  # radius of the rolled disc over the smallest radius
 HOLE_RADII = 2.0  # of the greatest radius: a disc that fits into a hole or outside, not into the gap of a missing grain
 MIN_GRAINS = 4  # that a Delaunay triangulation needs
+SIDES = ("at the top", "at the bottom", "at the right", "at the left", "around a hole inside")
+SIDEWAYS = np.array([[0.0, 0.0, 1.0, -1.0], [1.0, -1.0, 0.0, 0.0]])  # directions of the first four
+FEWEST_BARE = 4  # unbounded gaps between outer grains: fewer are a missing rod beside a wall
+
+
+class OpenSide(NamedTuple):
+    """A side of the packing, or its holes, without a wall."""
+
+    name: str
+    place: Array  # (2,) [m] middle of the surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +43,12 @@ class FreeSurface:
     place: Float[Array, "s 2"]  # [m] centre of the disc at rest on two of them
     outward: Float[Array, "s 2"]  # unit vectors from the surface to the disc
     inner: Bool[np.ndarray, " s"]  # True in a hole, False outside
+
+    def sides(self, chosen: Bool[np.ndarray, " s"]) -> list[OpenSide]:
+        """Name the sides on which at least FEWEST_BARE of the chosen places are."""
+        side = np.where(self.inner, len(SIDES) - 1, np.argmax(self.outward @ SIDEWAYS, axis=1))
+        places = [(name, self.place[chosen & (side == k)]) for k, name in enumerate(SIDES)]
+        return [OpenSide(name, place.mean(axis=0)) for name, place in places if len(place) >= FEWEST_BARE]
 
 
 def find_outer_grains(radius: Array, position: Array, present: NDArray[np.bool_], walls: Walls) -> FreeSurface:

@@ -97,6 +97,10 @@ CAUSES: dict[str, Cause] = {
         "calibrate the camera: x and y have different scales; a run removes it as far as the gaps show it",
         corrected=True,
     ),
+    "load_missing": Cause(
+        "forces that the weight causes are taken for any that friction can hold",
+        "give the weight, [material] gravity = [0, -9.81], or the pressure of a wall",
+    ),
     "lens": Cause(
         "rods that touch seem apart in one part of the picture and overlap in another",
         "calibrate the camera (photographs.lens); a run removes it as far as the gaps show it",

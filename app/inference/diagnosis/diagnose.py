@@ -28,9 +28,9 @@ from .causes import finding, name_once
 from .data_quality import measure_data_quality
 from .direct_tests import (
     examine_inertia,
+    examine_load,
     examine_order,
     examine_poses,
-    examine_rotations,
     examine_sizes,
     examine_wall_places,
     examine_walls,
@@ -39,6 +39,7 @@ from .direct_tests import (
 from .distortion import seeks_distortion, undistorted
 from .resistance import examine_resistance
 from .rivals import rivals_of
+from .rotation_tests import examine_rotations
 from .sections import examine_sections
 from .smoothed_tracks import examine_smoothing
 from .trial import TRIAL_PHOTOGRAPHS, Trial, select_window, solve_trial, trial_score
@@ -99,7 +100,7 @@ def diagnose(
     found = [*examine_rotations(tracks, walls), *examine_order(tracks), *examine_smoothing(inputs.tracks)]
     found += examine_walls(tracks, walls) or examine_wall_times(tracks, walls) or examine_wall_places(tracks, walls)
     found += examine_sizes(tracks, walls) or examine_sections(tracks)
-    found += examine_inertia(tracks, walls, inputs.material)
+    found += examine_inertia(tracks, walls, inputs.material) + examine_load(tracks, walls, inputs.material)
     impossible = np.zeros(tracks.status.shape, np.bool_) if undisturbed else find_impossible_poses(tracks, walls)
     poses = examine_poses(tracks, impossible)
     if not found and sliding and inputs.tracks.grain_count >= LEAST_GRAINS:

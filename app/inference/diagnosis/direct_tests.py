@@ -1,4 +1,4 @@
-"""Tests of the input that need no forces: rotations, order and speed of the photographs, poses, walls."""
+"""Tests of the input that need no forces: order and speed of the photographs, poses, sizes, walls, loads."""
 
 from __future__ import annotations
 
@@ -10,25 +10,18 @@ from numpy.typing import NDArray
 
 from ...results.finding import Finding
 from ...solver.bodies.grains import Array, Grains
+from ...solver.bodies.outer_grains import find_outer_grains
 from ...solver.bodies.rods import RodMaterial
 from ...solver.bodies.strain import displacement_gradient, inertial_time, shear_strain
 from ...solver.bodies.wall_shapes import STRAIGHT, outward_normals
+from ...solver.bodies.walls import Walls
 from ...solver.contacts.contacts import detect_contacts
-from ...solver.even_subset import even_subset
-from ...solver.inferred.unknown_rotations import fill_unknown_rotations
-from ...solver.statistics.agreement import pearson, ranks
 from ...tracks import Tracks, WallTracks
 from ..correction.outliers import find_outliers, walls_in
 from ..correction.radii import NAMED, find_oversized_rods, find_wrong_sizes
 from .causes import finding
 from .wall_times import rods_beside
 
-AGREES = 0.15  # rank correlation of stated and inferred rotations beyond which they are the same, or opposite …
-SIGMAS = 5.0  # … and standard deviations of that of unrelated ones
-DEGREES = 10.0  # ratio of stated to inferred rotations: degrees are 57 times radians …
-DEGREES_OF_NOISE = 30.0  # … where noise hides the sense of the rotations: half of that
-TURNS, FEWEST_TURNING = 0.3, 20  # least slope of the mean rotation over the packing's that counts; rods of a step
-SPAN_SIGMAS = 15.0  # standard deviations of a position by which rods must move among each other between two photographs
 SHORTER = 0.75  # path through the photographs in another order over the given one, below which that order is right
 UNEVEN = 0.4  # standard deviation of the steps over their mean from which on another order is looked for …
 SORTED = 0.4  # … which must make the path shorter by so much
@@ -48,108 +41,8 @@ USUAL, BEYOND_USUAL = 0.99, 1.5  # quantile of all overlaps, and times it that a
 MISSING = 0.03  # fraction of the poses that may be missing
 MOSTLY_MISSING = 0.5  # fraction of the rods that a photograph shows, below which it is named
 INERTIAL, OUT = 5e-3, 7.0  # inertial number that is reported; force out of balance over the mean force, for I = 1
-ROTATING_POSES, FEWEST_STEPS = 6000, 4  # poses, and steps between photographs, whose rotations are compared
 SEVERAL = 6  # rods that stand beyond a wall at least: with fewer, their radii may be wrong
 NEAREST = 3  # rods at a wall: the distance of the third nearest is judged
-
-
-def examine_rotations(tracks: Tracks, walls: WallTracks) -> list[Finding]:
-    """Compare stated rotations with those that rolling among the neighbours leads to expect.
-
-    Notes
-    -----
-    The rank correlation is that of Spearman over all rods and steps, about .3 to .5 for correct rotations. A step leads
-    over so many photographs that the rods move among each other by 15 standard deviations of a position: noise hides
-    the rotations of smaller ones (.14 over one photograph of the apparatus of corner discs, .29 over four).
-
-    Where it decides nothing, as in a drum, whose rods turn together, the mean rotation of all rods is compared with the
-    rotation of the packing, half the curl of the displacements: its slope was .5 to 1 in shear, in a drum 1.
-    """
-    span = _span(tracks)
-    stated = tracks.rotation[span:] - tracks.rotation[:-span]
-    known = np.isfinite(stated)
-    if not known.any():
-        return []
-    if not stated[known].any():
-        return [finding("rotation_zero", "no rod rotates in any photograph")]
-    apart = max((tracks.frame_count - 1) // span, 1)  # steps that do not overlap: their errors are independent
-    steps = min(max(ROTATING_POSES // tracks.grain_count, FEWEST_STEPS), apart)
-    chosen = even_subset(len(stated), steps)
-    inferred = np.array([_rolled(tracks, walls, k, k + span) for k in chosen.tolist()])
-    stated, known = stated[chosen], known[chosen] & np.isfinite(inferred)
-    stated, inferred = stated[known], inferred[known]
-    rank = pearson(ranks(stated), ranks(inferred)) if len(stated) > 1 and inferred.any() else 0.0
-    rolling = float(np.median(np.abs(inferred))) if len(stated) else 0.0
-    ratio = float(np.median(np.abs(stated))) / rolling if rolling > 0.0 else 0.0
-    excess = f"rods rotate {ratio:.0f} times as much as rolling leads to expect"
-    if abs(rank) >= max(AGREES, SIGMAS / np.sqrt(max(len(stated), 1))):
-        against = f"the rank correlation with the rotations expected from rolling is {rank:.2f}"
-        return _judge_rotations(rank, against, ratio, excess)
-    slope, error = _slope_of_turning(tracks)
-    if abs(slope) < max(TURNS, SIGMAS * error):
-        unrelated = f"{excess}, without relation to it"
-        return [finding("rotation_in_degrees", unrelated)] if ratio > DEGREES_OF_NOISE else []
-    words = f"rods rotate on average by {slope:.1f} times the rotation of the packing"
-    return _judge_rotations(slope, words, slope, words)
-
-
-def _judge_rotations(sense: float, against: str, ratio: float, excess: str) -> list[Finding]:
-    """Name rotations of the wrong sense, negative, or those that are too large by a ratio, with their evidence."""
-    if sense < 0:
-        return [finding("rotation_sign", against)]
-    return [finding("rotation_in_degrees", excess)] if ratio > DEGREES else []
-
-
-def _slope_of_turning(tracks: Tracks) -> tuple[float, float]:
-    """Slope of the rods' mean rotation over that of the packing, and its standard error; (0, inf): nothing turns."""
-    spin, mean, error = [], [], []
-    for k in range(1, tracks.frame_count):
-        rotated = tracks.rotation[k] - tracks.rotation[k - 1]
-        both = tracks.present_in(k - 1) & tracks.present_in(k) & np.isfinite(rotated)
-        if both.sum() < FEWEST_TURNING:
-            continue
-        gradient = _gradient(tracks, k, both)
-        spin.append(0.5 * float(gradient[1, 0] - gradient[0, 1]))
-        mean.append(float(rotated[both].mean()))
-        error.append(float(rotated[both].std()) / np.sqrt(both.sum()))
-    size = float(np.sum(np.square(spin)))
-    if not size > 0.0:
-        return 0.0, float("inf")
-    slope, variance = np.dot(spin, mean) / size, np.dot(np.square(spin), np.square(error)) / size**2
-    return float(slope), float(np.sqrt(variance))
-
-
-def _span(tracks: Tracks) -> int:
-    """Fewest photographs over which the rods move enough among each other; of too little motion, those of the most."""
-    sigma, most = float(np.nanmedian(tracks.position_sigma)), tracks.frame_count - 1
-    spans = np.unique(np.minimum(2 ** np.arange(most.bit_length() + 1), most)).tolist() if most > 0 else [1]
-    moved: list[float] = []
-    for span in spans:
-        moved.append(_deformation(tracks, span))
-        if moved[-1] >= SPAN_SIGMAS * sigma:
-            return span
-    return spans[int(np.argmax(moved))]
-
-
-def _deformation(tracks: Tracks, span: int) -> float:
-    """Median over the photographs of the rms displacement [m] of rods about their mean, over so many of them."""
-    moved = tracks.position[span:] - tracks.position[:-span]
-    found = [
-        float(np.sqrt(np.mean((each - each.mean(axis=0)) ** 2)))
-        for each in (step[np.isfinite(step).all(axis=1)] for step in moved)
-        if len(each)
-    ]
-    return float(np.median(found)) if found else 0.0
-
-
-def _rolled(tracks: Tracks, walls: WallTracks, k: int, later: int) -> Array:
-    """Rotations (n,) [rad] from photograph k to a later one that rolling among the neighbours leads to expect."""
-    part = slice(k, later + 1, later - k)
-    filled = fill_unknown_rotations(
-        tracks.radius, tracks.position[part], np.full_like(tracks.rotation[part], np.nan), tracks.present[part],
-        walls.endpoints[part], side=walls.side, cell=None if walls.cell is None else walls.cell[part],
-    )  # fmt: skip
-    return filled[1] - filled[0]
 
 
 def examine_order(tracks: Tracks) -> list[Finding]:
@@ -325,11 +218,11 @@ def _shear_rate(tracks: Tracks, k: int) -> float:
     both, time = tracks.present_in(k - 1) & tracks.present_in(k), float(tracks.time[k] - tracks.time[k - 1])
     if int(both.sum()) < 4 or not time > 0.0:
         return np.nan
-    gradient = _gradient(tracks, k, both)
+    gradient = step_gradient(tracks, k, both)
     return shear_strain(0.5 * (gradient + gradient.T)) / time
 
 
-def _gradient(tracks: Tracks, k: int, both: NDArray[np.bool_]) -> Array:
+def step_gradient(tracks: Tracks, k: int, both: NDArray[np.bool_]) -> Array:
     """Displacement gradient (2, 2) of some rods (n,) from the photograph before to photograph k."""
     moved = np.where(both[:, None], tracks.position[k] - tracks.position[k - 1], np.nan)
     return displacement_gradient(tracks.position[k - 1], moved, both)
@@ -388,3 +281,21 @@ def _near_gap(tracks: Tracks, walls: WallTracks, k: int, w: int, *, nearest: int
     """Gap [m] between a wall and one of the nearest rods beside it."""
     _, gap = rods_beside(tracks, k, walls.endpoints[k, w])
     return float(np.sort(gap)[nearest - 1]) if len(gap) >= nearest else np.nan
+
+
+def examine_load(tracks: Tracks, walls: WallTracks, material: RodMaterial) -> list[Finding]:
+    """Look for a packing with one open side and no load: forces at a free surface can have no other cause than weight.
+
+    Two open sides are those of a packing between two plates, whose motion may be imposed.
+    """
+    loaded = np.isfinite(walls.pressure).any() or (walls.load is not None and np.isfinite(walls.load).any())
+    bounded = tracks.boundary is not None or walls.cell is not None
+    if loaded or bounded or any(material.gravity) or not walls.count or np.isnan(walls.endpoints[0]).any():
+        return []
+    bounds = Walls.at_rest(walls.endpoints[0], side=walls.side)
+    surface = find_outer_grains(tracks.radius, tracks.position[0], tracks.present[0], bounds)
+    sides = surface.sides(~surface.inner)
+    if len(sides) != 1:
+        return []
+    words = f"no wall bears a load, no weight is given, and the packing is open {sides[0].name}"
+    return [finding("load_missing", words)]

@@ -1,4 +1,4 @@
-"""Errors of the input that show without forces: rotations, the order of the photographs, walls at rest."""
+"""Errors of the input that show without forces: the order of the photographs, walls at rest, a missing load."""
 
 from dataclasses import replace
 
@@ -7,13 +7,10 @@ import pytest
 from rodsight.inference.correction.outliers import find_outliers
 from rodsight.inference.correction.radii import find_oversized_rods, find_wrong_sizes
 from rodsight.inference.diagnosis.direct_tests import (
-    SPAN_SIGMAS,
-    _deformation,
-    _span,
     examine_inertia,
+    examine_load,
     examine_order,
     examine_poses,
-    examine_rotations,
     examine_sizes,
     examine_wall_places,
     examine_walls,
@@ -47,62 +44,6 @@ def box(frames=FRAMES):
     width = height = SIDE * PITCH
     ends = np.array([[[0.0, 0.0], [width, 0.0]], [[width, height], [0.0, height]]])
     return WallTracks(("bottom", "top"), np.repeat(ends[None], frames, axis=0), np.array([np.nan, 5e4]))
-
-
-def with_rolling(factor, step=STEP):
-    """The same with the rotations that rolling without noise leads to expect, times a factor."""
-    from rodsight.solver.inferred.unknown_rotations import fill_unknown_rotations
-
-    tracks, exact, walls = rolling_tracks(step), rolling_tracks(step, 0.0), box()
-    unknown = np.full_like(tracks.rotation, np.nan)
-    expected = fill_unknown_rotations(
-        exact.radius, exact.position, unknown, exact.present, walls.endpoints, side=walls.side, cell=None
-    )
-    return replace(tracks, rotation=factor * expected)
-
-
-@pytest.mark.parametrize(
-    ("factor", "cause"), [(1.0, None), (-1.0, "rotation_sign"), (57.3, "rotation_in_degrees"), (0.0, "rotation_zero")]
-)
-def test_wrong_rotations_are_recognised(factor, cause):
-    found = examine_rotations(with_rolling(factor), box())
-    assert [each.cause for each in found] == ([] if cause is None else [cause])
-
-
-def test_rotations_that_noise_hides_from_one_photograph_to_the_next_are_compared_over_several():
-    small = 3.0 * NOISE / PITCH
-    assert [each.cause for each in examine_rotations(with_rolling(-1.0, small), box())] == ["rotation_sign"]
-    assert examine_rotations(with_rolling(1.0, small), box()) == []
-
-
-def test_a_step_leads_over_the_fewest_photographs_that_move_the_rods_enough():
-    moved = _deformation(rolling_tracks(1.0, 0.0), 1)
-    for span in (1, 2, 4):
-        assert _span(rolling_tracks(1.05 * SPAN_SIGMAS * NOISE / (span * moved))) == span
-    most = FRAMES - 1
-    assert _span(rolling_tracks(0.5 * SPAN_SIGMAS * NOISE / (most * moved))) == most
-
-
-@pytest.mark.parametrize(("factor", "cause"), [(1.0, None), (-1.0, "rotation_sign"), (57.3, "rotation_in_degrees")])
-def test_rods_that_turn_with_the_packing_show_wrong_rotations(factor, cause):
-    tracks = rolling_tracks(0.0)
-    angle = 0.01 * np.arange(FRAMES)
-    turn = np.moveaxis(np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]), 2, 0)
-    noise = 1e-3 * np.random.default_rng(1).normal(size=(FRAMES, N))
-    turned = replace(tracks, position=tracks.position @ turn, rotation=factor * (angle[:, None] + noise))
-    found = examine_rotations(turned, box())
-    assert [each.cause for each in found] == ([] if cause is None else [cause])
-
-
-def test_unknown_and_unrelated_rotations_give_no_finding():
-    tracks = rolling_tracks()
-    assert examine_rotations(replace(tracks, rotation=np.full((FRAMES, N), np.nan)), box()) == []
-    random = np.random.default_rng(5).normal(size=(FRAMES, N))
-    usual = float(np.median(np.abs(np.diff(with_rolling(1.0).rotation, axis=0))))
-    assert examine_rotations(replace(tracks, rotation=10.0 * usual * random), box()) == []
-    (found,) = examine_rotations(replace(tracks, rotation=1e3 * usual * random), box())
-    assert found.cause == "rotation_in_degrees"
-    assert found.evidence.endswith("without relation to it")
 
 
 def test_photographs_in_order_give_no_finding():
@@ -355,3 +296,28 @@ def test_rods_beyond_a_wall_are_named():
     (found,) = examine_wall_places(tracks, replace(walls, endpoints=inside))
     assert found.cause == "wall_misplaced"
     assert "2 mm beyond wall 'top'" in found.evidence
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({}, True), ({"pressure": np.array([5e4, np.nan, np.nan])}, False), ({"gravity": (0.0, -9.81)}, False),
+        ({"lid": True}, False), ({"bars": ["bottom"]}, False),
+    ],
+)  # fmt: skip
+def test_an_open_side_without_any_load_is_named(change, named):
+    ends = closed_box()
+    bars = change.get("bars", ["bottom", "right", "left", *["top"] * change.get("lid", False)])
+    rows = [("bottom", "right", "top", "left").index(bar) for bar in bars]
+    pressure = change.get("pressure", np.full(len(bars), np.nan))
+    walls = WallTracks(tuple(bars), np.repeat(ends[None, rows], FRAMES, axis=0), pressure)
+    found = examine_load(rolling_tracks(0.0), walls, RodMaterial(gravity=change.get("gravity", (0.0, 0.0))))
+    assert [each.cause for each in found] == ["load_missing"] * named
+    assert all(each.evidence.endswith("open at the top") for each in found)
+
+
+def closed_box():
+    """Bottom, right, top and left of a box around the rods at rest."""
+    width = SIDE * PITCH
+    corner = np.array([[0.0, 0.0], [width, 0.0], [width, width], [0.0, width]])
+    return np.stack([corner, np.roll(corner, -1, axis=0)], axis=1)
