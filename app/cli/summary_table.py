@@ -193,7 +193,7 @@ def load_line(load: dict[str, Any]) -> str:
     """State the load on a wall in newtons, which sets the scale of the forces."""
     wall, force = escape(load["wall"]), load["force"]
     rest = 1.0 - load.get("fraction_on_free_rods", 1.0)
-    part = f" Rods of the boundary bear {100.0 * rest:.0f} % of it, the others the rest." if rest > 0.0 else ""
+    part = f" Rods of the boundary are on {100.0 * rest:.0f} % of its width." if rest > 0.0 else ""
     if load["pressure"] is None:
         low, high = load["range"]
         return f"Load on '{wall}', measured: {force:.4g} N in the mean ({low:.4g} to {high:.4g} N).{part}"

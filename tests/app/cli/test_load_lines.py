@@ -13,7 +13,7 @@ MEASURED = PRESSED | {"pressure": None, "range": [740.0, 760.0]}
 def test_the_part_on_boundary_rods_is_stated_where_there_is_one(load) -> None:
     assert "750 N" in load_line(load)
     assert "boundary" not in load_line(load)
-    assert "Rods of the boundary bear 9 % of it" in load_line(load | {"fraction_on_free_rods": 0.91})
+    assert "Rods of the boundary are on 9 % of its width" in load_line(load | {"fraction_on_free_rods": 0.91})
     earlier = {key: value for key, value in load.items() if key != "fraction_on_free_rods"}
     assert load_line(earlier) == load_line(load)
 

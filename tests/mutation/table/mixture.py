@@ -6,6 +6,14 @@ TESTS = "tests/solver/mixture"
 
 MUTANTS = [
     *mutants_of(
+        "solver/sequence/boundary_load.py",
+        "tests/solver/sequence/test_boundary_load.py",
+        ("along[second & ~first].sum()", "0.0"),
+        ("- along[first & ~second].sum()", ""),
+        ("if boundary is None or len(loaded) != 1 or any", "if boundary is None or any"),
+        ("or any(packing.material.gravity):", "or False:"),
+    ),
+    *mutants_of(
         "solver/mixture/frame_mixture.py",
         f"{TESTS}/test_frame_mixture.py",
         ("force, factor = force / factor, 1.0", "force, factor = force, factor"),

@@ -101,6 +101,7 @@ def test_hard_grains_that_all_find_balance_may_change_by_more(monkeypatch):
     between = 0.5 * (MAX_CHANGE + MAX_CHANGE_BALANCED)
     np.testing.assert_array_equal(project(between), strict.fn)
     assert np.abs(project(between, soft=True) - strict.fn).max() > 0.0
+    np.testing.assert_array_equal(project(0.9 * MAX_CHANGE, soft=True), strict.fn)
     assert np.abs(project(1.1 * MAX_CHANGE_BALANCED) - strict.fn).max() > 0.0
     monkeypatch.setattr(equilibrium_projection, "MAX_RESIDUAL", 1e-9)  # no residual is that small
     assert np.abs(project(between) - strict.fn).max() > 0.0

@@ -1,0 +1,87 @@
+"""Rods glued to a plate under load: the forces on both carry the load."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numba
+import numpy as np
+import pytest
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.bodies.motion import Snapshot
+from rodsight.solver.bodies.packing import Material, Packing
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.pairs import make_keys, match_values
+from rodsight.solver.sequence import frame as frames
+from rodsight.solver.sequence.boundary_load import scale_to_load
+from rodsight.solver.sequence.frames import solve_sequence
+from rodsight.solver.sequence.settings import SequenceSettings
+
+from tests.solver.posterior.simulated import simulate_shear
+
+pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
+TOP, FRAMES = 2, 4
+
+
+@pytest.fixture(scope="module")
+def glued():
+    """A packing in shear whose rods at the top are rods of the boundary, and the true forces of others on these."""
+    sheared = simulate_shear(0.25, FRAMES)
+    grains = sheared.packing.grains
+    top = sheared.snapshots[0].endpoints[TOP, :, 1].mean()
+    at_top = top - sheared.snapshots[0].position[:, 1] < 1.05 * grains.radius
+    return sheared, replace(sheared.packing, grains=replace(grains, boundary=at_top))
+
+
+def scales(sheared, packing) -> list[float]:
+    """Sums of f_n of every frame over the true ones of the same contacts."""
+    found = []
+    for k, (frame, _) in enumerate(solve_sequence(packing, sheared.snapshots, SequenceSettings())):
+        key, force = sheared.truth(k)
+        contacts = frame.contacts
+        known = make_keys(contacts.i, contacts.j, packing.grains.count + 4)
+        true = match_values(known, np.sort(key), force[np.argsort(key), 0], fill=np.nan)
+        found.append(float(frame.fn[np.isfinite(true)].sum() / np.nansum(true)))
+    return found
+
+
+@pytest.mark.thorough
+def test_rods_glued_to_a_plate_bear_their_part_of_its_load(glued, monkeypatch) -> None:
+    sheared, packing = glued
+    assert packing.grains.boundary.sum() > 5
+    right = np.array(scales(sheared, packing))
+    monkeypatch.setattr(frames, "scale_to_load", lambda *_: 1.0)
+    by_width = np.array(scales(sheared, packing))
+    assert np.abs(right - 1.0)[1:].max() < 0.15
+    assert np.abs(by_width - 1.0)[1:].max() > 0.2
+
+
+def problem_of(boundary=(True, False, False, True), pressure=(np.nan, 1000.0), gravity=(0.0, 0.0)):
+    """Two columns of two rods between a bottom and a plate of 1 m² that is under load; the upper rods are glued to it."""
+    radius = np.full(4, 0.1)
+    grains = Grains(radius, np.ones(4), np.array(boundary))
+    packing = Packing(grains, 1.0, Material(0.3, 0.3, gravity=gravity), np.array(pressure))
+    position = np.array([[0.2, 0.3], [0.2, 0.1], [0.6, 0.1], [0.6, 0.3]])
+    ends = np.array([[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.4], [0.0, 0.4]]])
+    snapshot = Snapshot(0.0, position, np.zeros(4), np.ones(4, bool), ends, 1e-6)
+    contacts = SimpleNamespace(  # glued and free, free and glued, free and bottom twice
+        i=np.array([0, 2, 1, 2]), j=np.array([1, 3, 4, 4]),
+        normal=np.array([[0.0, -1.0], [0.0, 1.0], [0.0, -1.0], [0.0, -1.0]]), tangent=np.array([[1.0, 0.0]] * 4),
+    )  # fmt: skip
+    estimate = SimpleNamespace(
+        contacts=contacts, fn=np.array([300.0, 200.0, 300.0, 200.0]), ft=np.zeros(4),
+        step=SimpleNamespace(walls=Walls.at_rest(ends)),
+    )  # fmt: skip
+    return SimpleNamespace(packing=packing, snapshot=snapshot), estimate
+
+
+def test_glued_rods_bear_the_load_wherever_they_stand_in_a_pair():
+    assert scale_to_load(*problem_of()) == pytest.approx(1000.0 / 500.0)
+
+
+@pytest.mark.parametrize(
+    "changed", [{"boundary": (False,) * 4}, {"pressure": (500.0, 1000.0)}, {"gravity": (0.0, -9.81)}]
+)
+def test_without_glued_rods_with_two_loads_or_with_weight_nothing_is_scaled(changed):
+    assert scale_to_load(*problem_of(**changed)) == 1.0
