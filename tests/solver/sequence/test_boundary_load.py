@@ -81,7 +81,12 @@ def test_glued_rods_bear_the_load_wherever_they_stand_in_a_pair():
 
 
 @pytest.mark.parametrize(
-    "changed", [{"boundary": (False,) * 4}, {"pressure": (500.0, 1000.0)}, {"gravity": (0.0, -9.81)}]
+    "changed",
+    [
+        {"boundary": (False,) * 4},
+        {"pressure": (500.0, 1000.0), "boundary": (True, True, False, True)},
+        {"gravity": (0.0, -9.81)},
+    ],
 )
 def test_without_glued_rods_with_two_loads_or_with_weight_nothing_is_scaled(changed):
     assert scale_to_load(*problem_of(**changed)) == 1.0
