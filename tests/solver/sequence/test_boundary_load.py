@@ -58,7 +58,7 @@ def test_rods_glued_to_a_plate_bear_their_part_of_its_load(glued, monkeypatch) -
 
 
 def problem_of(boundary=(True, False, False, True), pressure=(np.nan, 1000.0), gravity=(0.0, 0.0)):
-    """Two columns of two rods between a bottom and a plate of 1 m² that is under load; the upper rods are glued to it."""
+    """Two columns of two rods between a bottom and a plate of 1 m² that is under load, upper ones glued to it."""
     radius = np.full(4, 0.1)
     grains = Grains(radius, np.ones(4), np.array(boundary))
     packing = Packing(grains, 1.0, Material(0.3, 0.3, gravity=gravity), np.array(pressure))
@@ -84,7 +84,7 @@ def test_glued_rods_bear_the_load_wherever_they_stand_in_a_pair():
     "changed",
     [
         {"boundary": (False,) * 4},
-        {"pressure": (500.0, 1000.0), "boundary": (True, True, False, True)},
+        {"pressure": (400.0, 1000.0), "boundary": (True, True, False, True)},
         {"gravity": (0.0, -9.81)},
     ],
 )
