@@ -1,7 +1,8 @@
-"""The load on a plate that rods of the boundary bear as well: rods glued to it, or the outermost ones of a picture.
+"""The load on a plate that rods glued to it bear as well.
 
 Their contacts with the plate are not part of the model, since the motion of both is given, so that the load is first
-divided by the widths of the rods. The forces that free rods exert on them show what they bear.
+divided by the widths of the rods. The forces that free rods exert on them show what they bear. A few rods of another
+boundary at the end of a plate, as of a membrane, are also held by their neighbours in it: their width is better there.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from .estimate import Estimate
 from .frame_problem import FrameProblem
 
 AT_PLATE = 0.3  # radii: greatest gap of a boundary rod that is held by the plate: glue is no thinner
+GLUED = 0.3  # fraction of the plate's width, by rods of the boundary, from which on they are glued to it
 LEAST_BORNE = 0.1  # of the load: what is read from less is noise
 
 
@@ -33,8 +35,9 @@ def scale_to_load(problem: FrameProblem, estimate: Estimate) -> float:
     walls = estimate.step.walls
     radius = packing.grains.radius
     distance, _ = walls.distance(np.full(n, w), snapshot.position)
-    at_plate = boundary & snapshot.present & (np.abs(distance - radius) < AT_PLATE * radius)
-    if walls.curved[w] or not at_plate.any():
+    beside = snapshot.present & (np.abs(distance - radius) < AT_PLATE * radius)
+    at_plate = boundary & beside
+    if walls.curved[w] or not at_plate.any() or radius[at_plate].sum() < GLUED * radius[beside].sum():
         return 1.0
     force = estimate.fn[:, None] * contacts.normal + estimate.ft[:, None] * contacts.tangent
     along = force @ walls.outward[w]

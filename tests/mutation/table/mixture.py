@@ -12,6 +12,7 @@ MUTANTS = [
         ("- along[first & ~second].sum()", ""),
         ("if boundary is None or len(loaded) != 1 or any", "if boundary is None or any"),
         ("or any(packing.material.gravity):", "or False:"),
+        (" or radius[at_plate].sum() < GLUED * radius[beside].sum()", ""),
     ),
     *mutants_of(
         "solver/mixture/frame_mixture.py",

@@ -57,16 +57,16 @@ def test_rods_glued_to_a_plate_bear_their_part_of_its_load(glued, monkeypatch) -
     assert np.abs(by_width - 1.0)[1:].max() > 0.2
 
 
-def problem_of(boundary=(True, False, False, True), pressure=(np.nan, 1000.0), gravity=(0.0, 0.0)):
-    """Two columns of two rods between a bottom and a plate of 1 m² that is under load, upper ones glued to it."""
-    radius = np.full(4, 0.1)
-    grains = Grains(radius, np.ones(4), np.array(boundary))
+def problem_of(boundary=(1, 0, 0, 1, 0), pressure=(np.nan, 1000.0), gravity=(0.0, 0.0), glued=0.1):
+    """Two columns of two rods between a bottom and a plate of 1 m² under load, to which two are glued; a free rod."""
+    radius = np.array([glued, 0.1, 0.1, glued, 0.1])
+    grains = Grains(radius, np.ones(5), np.array(boundary, np.bool_))
     packing = Packing(grains, 1.0, Material(0.3, 0.3, gravity=gravity), np.array(pressure))
-    position = np.array([[0.2, 0.3], [0.2, 0.1], [0.6, 0.1], [0.6, 0.3]])
+    position = np.array([[0.2, 0.4 - radius[0]], [0.2, 0.1], [0.6, 0.1], [0.6, 0.4 - radius[3]], [0.9, 0.3]])
     ends = np.array([[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.4], [0.0, 0.4]]])
-    snapshot = Snapshot(0.0, position, np.zeros(4), np.ones(4, bool), ends, 1e-6)
+    snapshot = Snapshot(0.0, position, np.zeros(5), np.ones(5, bool), ends, 1e-6)
     contacts = SimpleNamespace(  # glued and free, free and glued, free and bottom twice
-        i=np.array([0, 2, 1, 2]), j=np.array([1, 3, 4, 4]),
+        i=np.array([0, 2, 1, 2]), j=np.array([1, 3, 5, 5]),
         normal=np.array([[0.0, -1.0], [0.0, 1.0], [0.0, -1.0], [0.0, -1.0]]), tangent=np.array([[1.0, 0.0]] * 4),
     )  # fmt: skip
     estimate = SimpleNamespace(
@@ -83,9 +83,10 @@ def test_glued_rods_bear_the_load_wherever_they_stand_in_a_pair():
 @pytest.mark.parametrize(
     "changed",
     [
-        {"boundary": (False,) * 4},
-        {"pressure": (400.0, 1000.0), "boundary": (True, True, False, True)},
+        {"boundary": (0,) * 5},
+        {"pressure": (400.0, 1000.0), "boundary": (1, 1, 0, 1, 0)},
         {"gravity": (0.0, -9.81)},
+        {"glued": 0.02},
     ],
 )
 def test_without_glued_rods_with_two_loads_or_with_weight_nothing_is_scaled(changed):
