@@ -24,6 +24,7 @@ from ..solver.assessment.intervals.wall_sensors import scale_error
 from ..solver.assessment.penalties import (
     limit_by_intervals,
     limit_for_few_photographs,
+    limit_for_missing_load,
     penalise_contradiction,
     penalise_friction,
 )
@@ -125,7 +126,13 @@ def infer_sequence(
         release_free_memory()
         diagnosis = diagnose_solved(inputs, results, observer.progress, undisturbed=sequence.undisturbed)
     words = "; ".join(f"{each.cause.replace('_', ' ')}: {each.cure}" for each in uncorrected(diagnosis))
-    penalised = LazySequence(count, lambda k: penalise_contradiction(assessed[k], words)) if words else assessed
+    loaded = all(each.cause != "load_missing" for each in diagnosis)
+
+    def penalise(k: int) -> FrameForces:
+        frame = penalise_contradiction(assessed[k], words)
+        return frame if loaded else limit_for_missing_load(frame)
+
+    penalised = LazySequence(count, penalise) if words else assessed
     return replace(results, diagnosis=tuple(diagnosis), frames=penalised)
 
 

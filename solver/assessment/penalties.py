@@ -22,6 +22,7 @@ SOFT_CHAIN_LOSS = 0.15  # where a single chain treats soft grains as hard
 BEYOND_WALL_LOSS = 12.0  # for each grain beyond a wall, per grain
 STEP_SHOWN_BY = ("previous_residual", "force_change")  # evidence that too large a step explains
 FEW_PHOTOGRAPHS, TRUST_OF_FEW = 3, 0.28  # of a test, below which the trust is at most the second
+TRUST_WITHOUT_LOAD = 0.28  # of a packing with one open side and neither load nor weight: r .3 to .65 in two of them
 LEFT_BY_INTERVALS = 2.5, 0.4  # of `most_by_intervals`
 LITTLE_KNOWN = frozenset({"undetermined", "noise", "few_interior"})  # measures that contradict nothing
 BY_NOISE = frozenset({"disagreement_of_positions", "disagreement_with_either"})  # the same where noise hides overlaps
@@ -144,6 +145,11 @@ def limit_for_few_photographs(frame: FrameForces, count: int) -> FrameForces:
     return limit_trust(frame, TRUST_OF_FEW, TRUST_OF_FEW, words) if words else frame
 
 
+def limit_for_missing_load(frame: FrameForces) -> FrameForces:
+    """Limit trust and expected correlation where nothing is known that presses the grains together."""
+    return limit_trust(frame, TRUST_WITHOUT_LOAD, TRUST_WITHOUT_LOAD, "")
+
+
 def limit_by_intervals(frame: FrameForces) -> FrameForces:
     """Limit trust and expected correlation of hard grains to what the error bars of the forces leave."""
     most = most_by_intervals(frame)
@@ -238,8 +244,8 @@ def _contradictions(evidence: Evidence) -> list[Penalty]:
         "with more shear, or more exact positions",
         "load_mismatch": f"the mean stress is {evidence.load_fraction:.2f} of the load: walls, loads or contacts "
         "are wrong",
-        "force_residual": f"a grain is out of balance by {evidence.unbalance:.2g} of the mean force, whatever the "
-        "forces: contacts, walls or friction are not as stated",
+        "force_residual": f"a grain is out of balance by {evidence.unbalance:.2g} of the mean force, since forces in "
+        "balance are far from those that motion and positions show: contacts, walls or friction are not as stated",
         "inertial_number": f"the inertial number is {evidence.inertial_number:.2g}: part of the forces accelerates "
         "grains; load more slowly, or photograph at rest",
         "coarse_step": moved,
