@@ -97,6 +97,9 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
     friction = summary["friction"]
     if friction is not None and friction["enclosed"]:
         lines.append(friction_line(friction, [each["cause"] for each in summary.get("diagnosis", [])]))
+    elif friction is not None and friction.get("sliding") is not None:
+        sliding = f"{100.0 * friction['sliding']:.0f} % of the contacts slide by more than 1.5 standard deviations"
+        lines.append(f"Friction is used as given: the motion does not show it ({sliding}, by noise alone 13 %).")
     if summary.get("base_friction"):
         lines.append(f"Friction of the base that was used: {summary['base_friction']:.3g}.")
     if friction is not None and friction["walls"][0] is not None:

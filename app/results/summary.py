@@ -214,6 +214,7 @@ def _friction(results: Results) -> dict[str, Any] | None:
         "high": _plain([check.high])[0],
         "frames": [check.first, check.last],
         "enclosed": check.enclosed,
+        "sliding": _plain([check.sliding])[0],
         "walls": _plain([check.wall_measured, check.wall_low, check.wall_high]),
         "agrees": check.agrees if check.enclosed else None,  # None: undetermined
     }

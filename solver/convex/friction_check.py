@@ -54,7 +54,9 @@ class FrictionCheck:
     high: Annotated[float, Quantity("upper end of that interval")]
     first: Annotated[int, Quantity("first frame of the check", absent=0)]
     last: Annotated[int, Quantity("last frame of the check", absent=0)]
-    enclosed: Annotated[bool, Quantity("whether the friction lies within the trials", absent=False)]
+    enclosed: Annotated[
+        bool, Quantity("whether the friction lies within the trials, and enough slides to show it", absent=False)
+    ]
     trial: Annotated[Array, Quantity("trial factors on the given friction", dims="friction_trial")]
     gap: Annotated[Array, Quantity("relative power gap of every trial", dims="friction_trial")]
 
@@ -63,6 +65,9 @@ class FrictionCheck:
     ] = float("nan")
     wall_low: Annotated[float, Quantity("lower end of its interval", since=2)] = float("nan")
     wall_high: Annotated[float, Quantity("upper end of its interval", since=2)] = float("nan")
+    sliding: Annotated[
+        float, Quantity("fraction of the contacts that slide by more than 1.5 standard deviations of a slide", since=2)
+    ] = float("nan")
 
     @property
     def given_gap(self) -> float:
@@ -108,9 +113,10 @@ def check_friction(
     measured = given * found.factor / BIAS
     relative_sd = 0.0 if np.isnan(found.factor_sd) else found.factor_sd / max(found.factor, 1e-12)
     half_width = COVERAGE_FACTOR * float(np.hypot(relative_sd, BIAS_SD))
+    sliding = float(np.mean(np.concatenate([frame.slip for frame in frames]) != 0.0))
     return FrictionCheck(
         given, measured, measured * (1.0 - half_width), measured * (1.0 + half_width), first, last, found.enclosed,
-        found.trial, found.gap,
+        found.trial, found.gap, sliding=sliding,
     )  # fmt: skip
 
 

@@ -100,9 +100,15 @@ def check_solved(monkeypatch):
     """Check the friction of ten solved frames of 2500 contacts; return the frames that are read, and the result."""
 
     def check(packing, snapshots, first, last, unit, settings, workers) -> FrictionCheck:
-        return FrictionCheck(0.25, 0.3, 0.2, 0.4, first, last, True, np.ones(3), np.ones(3))
+        sliding = slides.pop() if slides else np.nan
+        return FrictionCheck(0.25, 0.3, 0.2, 0.4, first, last, True, np.ones(3), np.ones(3), sliding=sliding)
 
-    def by(calm: Collection[int], lost: Collection[tuple[int, int]] = (), walls: Any = None) -> FrictionCheck | None:
+    slides: list[float] = []
+
+    def by(
+        calm: Collection[int], lost: Collection[tuple[int, int]] = (), walls: Any = None, sliding: float | None = None
+    ) -> FrictionCheck | None:
+        slides[:] = [] if sliding is None else [sliding]
         packing, snapshots = sheared_frames(10, lost=list(lost))
         status = [FrameStatus.SETTLED if k in calm else FrameStatus.SUSPECT for k in range(10)]
         frames = [SimpleNamespace(status=each, contacts=SimpleNamespace(count=2500)) for each in status]
@@ -117,6 +123,13 @@ def test_the_friction_is_checked_on_the_quietest_frames(check_solved) -> None:
     assert [check_solved({5, 6, 7, 8}).first, check_solved({5, 6, 7, 8}).last] == [5, 8]
     assert check_solved({2, 3, 4, 5, 8}).first == 2
     assert check_solved(range(10), lost=[(2, 14)]).first == 3  # rods are lost from one photograph
+
+
+@pytest.mark.parametrize(("sliding", "shown"), [(0.5, True), (0.14, False), (np.nan, True)])
+def test_sliding_by_noise_alone_shows_no_friction(check_solved, sliding, shown) -> None:
+    check = check_solved(range(10), sliding=sliding)
+    assert check.enclosed is shown
+    assert check.agrees
 
 
 def test_the_friction_is_not_checked_where_rods_are_lost_throughout(check_solved) -> None:

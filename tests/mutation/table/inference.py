@@ -8,6 +8,12 @@ OUTLIERS = f"{TESTS}/test_outliers.py"
 
 MUTANTS = [
     *mutants_of(
+        "app/inference/correction/friction.py",
+        f"{TESTS}/test_measured_friction.py",
+        ("if check.sliding < LEAST_SLIDING:", "if False:"),
+        ("if check.sliding < LEAST_SLIDING:", "if not check.sliding > LEAST_SLIDING:"),
+    ),
+    *mutants_of(
         "app/inference/diagnosis/distortion.py",
         f"{TESTS}/diagnosis/test_diagnose.py",
         ("if found is None or not found.applied:", "if found is None:"),
