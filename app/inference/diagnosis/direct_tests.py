@@ -91,26 +91,27 @@ def examine_walls(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     if walls.count == 0 or tracks.frame_count < 3:
         return []
     allowed = max(DRIFT_SIGMAS * float(np.nanmedian(tracks.position_sigma)), DRIFT * float(tracks.radius.mean()))
-    changes = {w: _change_of_gap(tracks, walls, w) for w in np.flatnonzero(walls.sides == STRAIGHT).tolist()}
-    changes = {w: change for w, change in changes.items() if np.isfinite(change)}
+    gaps = {w: _first_and_last_gap(tracks, walls, w) for w in np.flatnonzero(walls.sides == STRAIGHT).tolist()}
+    changes = {w: last - first for w, (first, last) in gaps.items() if np.isfinite(last - first)}
     if _moved_together(walls, changes):
         return []
     found = []
     for w, change in changes.items():
         loaded = np.isfinite(walls.pressure[w]) or (walls.load is not None and np.isfinite(walls.load[:, w]).any())
         still = float(np.abs(walls.endpoints[:, w] - walls.endpoints[0, w]).max()) < allowed
-        if still and (change < -allowed or (loaded and change > allowed)):
+        penetrated = max(change, gaps[w][1]) < -allowed  # rods that only come near a wall do not
+        if still and (penetrated or (loaded and change > allowed)):
             does = "penetrate" if change < 0 else "leave"
             words = f"rods {does} wall '{walls.name[w]}', which does not move, by {1e3 * abs(change):.2g} mm"
             found.append(finding("wall_at_rest", words))
     return found
 
 
-def _change_of_gap(tracks: Tracks, walls: WallTracks, w: int) -> float:
-    """Median change of the gap at wall w [m] from the first photograph to the last three; NaN without rods there."""
+def _first_and_last_gap(tracks: Tracks, walls: WallTracks, w: int) -> tuple[float, float]:
+    """Gaps at wall w [m] in the first photograph and, by their median, in the last three; NaN without rods there."""
     forward, back = (_known_gaps(tracks, walls, w, order) for order in (1, -1))
     begin, end = list(islice(forward, 1)), list(islice(back, 3))
-    return float(np.median(np.array(end) - begin)) if len(end) == 3 else np.nan
+    return (begin[0], float(np.median(end))) if len(end) == 3 else (np.nan, np.nan)
 
 
 def _moved_together(walls: WallTracks, changes: Mapping[int, float]) -> bool:

@@ -147,6 +147,18 @@ def test_a_wall_that_rods_penetrate_while_it_rests_is_named():
     assert examine_walls(moved, replace(walls, endpoints=endpoints)) == []
 
 
+def test_rods_that_come_near_a_wall_do_not_penetrate_it():
+    tracks = rolling_tracks()
+    walls = box()
+    near = tracks.position.copy()
+    near[..., 1] += 2e-3 * np.linspace(1.0, 0.0, FRAMES)[:, None]  # they sink to the bottom
+    opened = WallTracks(("bottom",), walls.endpoints[:, :1], np.full(1, np.nan))
+    assert examine_walls(replace(tracks, position=near), opened) == []
+    beyond = near - [0.0, 2e-3]
+    (found,) = examine_walls(replace(tracks, position=beyond), opened)
+    assert found.cause == "wall_at_rest"
+
+
 def test_rods_in_the_half_of_a_box_that_slides_do_not_penetrate_the_other_half():
     tracks = rolling_tracks()
     side = SIDE * PITCH
