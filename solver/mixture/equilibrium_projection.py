@@ -22,13 +22,14 @@ from ..statistics.balance import mean_normal_force
 # to 3 where pairs are missing from the list, or the balance lacks forces, as those of a base with friction. Strict
 # equilibrium then spoils a good field; relaxed equilibrium may change it by less.
 MAX_CHANGE, MAX_CHANGE_RELAXED = 0.45, 0.15
-# Hard grains: the same where strict equilibrium leaves no residual above this, over the mean f_n. Then it contradicts
-# no grain, and the standard deviations were too small; on 20 packings of another program such changes are .5 to 1.
-MAX_CHANGE_BALANCED, MAX_RESIDUAL = 1.0, 0.04
+# Hard grains: the same where exact equilibrium is possible, and leaves no residual above this, over the mean f_n. On 20
+# packings of another program such changes are .5 to 1, and the residual is below .001. With wrong friction, a wall that
+# is missing, inertia or a base with friction it is .02 to .15, with cohesion or rolling resistance .001 to .025.
+MAX_CHANGE_EXACT, MAX_RESIDUAL = 1.0, 0.005
 # The same for soft grains, whose position-only estimate is in balance on average only: .15, .35 and .45 give a mean r
 # of .597, .608 and .611 on three sets of photoelastic discs, .929, .927 and .925 on simulated loose soft discs.
 MAX_CHANGE_SOFT = 0.35
-STRICT = 100.0  # factor on the price of a force residual in strict equilibrium, which leaves a hundredth of them
+EXACT = 100.0  # factor on the price of a force residual in exact equilibrium, which leaves a hundredth of them
 RELAXATION = (0.1, 0.03, 0.01, 0.003, 0.001)  # factors on the price of a force residual, tried in this order
 KEPT_TOTAL = 1e-3  # relative change of a sum of forces that is let pass
 RAISED = 3.0  # the second field that is projected is this often as much larger as the sum of the first is too small
@@ -71,9 +72,10 @@ def project_mixed_field(
 
     Notes
     -----
-    The strict projection, at a hundred times the price, is accepted if rms(Δf_n) ≤ 0.45 rms(fn_sd), or rms(fn_sd) where
-    grains are hard and it leaves no residual above .04 of the mean f_n. Otherwise the price is multiplied by 0.1, 0.03,
-    0.01, 0.003 or 0.001, the first for which rms(Δf_n) ≤ 0.15 rms(fn_sd), 0.35 of it for soft grains, else the last.
+    The exact projection of hard grains, at a hundred times the price, is accepted if it leaves no residual over .005 of
+    the mean f_n and rms(Δf_n) ≤ rms(fn_sd); else the strict one if rms(Δf_n) ≤ 0.45 rms(fn_sd). Otherwise the price is
+    multiplied by 0.1, 0.03, 0.01, 0.003 or 0.001, the first for which rms(Δf_n) ≤ 0.15 rms(fn_sd), 0.35 of it for soft
+    grains, else the last.
 
     Where the sum S_1 of the accepted f_n differs from S = (1 − w) S_1 + w S_0 with the wanted sum S_0 and its weight w,
     a multiple of the given field is projected, too, and
@@ -107,12 +109,15 @@ def _project_within(
     """Project with the least relaxation that keeps the change within the standard deviations; return the price, too."""
     fn, ft, fn_sd = field
     sd = float(np.sqrt(np.mean(fn_sd**2))) if len(fn_sd) else 0.0
-    strict = STRICT * settings.balance
-    found = project_onto_equilibrium(balance, fn, ft, replace(settings, balance=strict))
-    change = _rms_change(found.fn, fn)
-    balanced = not soft and change <= MAX_CHANGE_BALANCED * sd and _residual(balance, found) <= MAX_RESIDUAL
-    if found.converged and (change <= MAX_CHANGE * sd or balanced):
-        return found, strict
+    if not soft:
+        price = EXACT * settings.balance
+        found = project_onto_equilibrium(balance, fn, ft, replace(settings, balance=price))
+        near = _rms_change(found.fn, fn) <= MAX_CHANGE_EXACT * sd
+        if found.converged and near and _residual(balance, found) <= MAX_RESIDUAL:
+            return found, price
+    found = project_onto_equilibrium(balance, fn, ft, settings)
+    if found.converged and _rms_change(found.fn, fn) <= MAX_CHANGE * sd:
+        return found, settings.balance
     price, limit = settings.balance, MAX_CHANGE_SOFT if soft else MAX_CHANGE_RELAXED
     for factor in RELAXATION:
         price = factor * settings.balance

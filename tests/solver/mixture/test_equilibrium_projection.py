@@ -14,12 +14,12 @@ from rodsight.solver.convex.program import (
 )
 from rodsight.solver.mixture import equilibrium_projection
 from rodsight.solver.mixture.equilibrium_projection import (
+    EXACT,
     MAX_CHANGE,
-    MAX_CHANGE_BALANCED,
+    MAX_CHANGE_EXACT,
     MAX_CHANGE_RELAXED,
     MAX_CHANGE_SOFT,
     RELAXATION,
-    STRICT,
     WeightedSum,
     project_mixed_field,
 )
@@ -61,55 +61,57 @@ def change(found, fn, fn_sd):
     return np.sqrt(np.mean((found.fn - fn) ** 2) / np.mean(fn_sd**2))
 
 
-def project_strictly(balance, fn, ft):
-    return project_onto_equilibrium(balance, fn, ft, ConvexSettings(balance=STRICT * ConvexSettings().balance))
+def project_exactly(balance, fn, ft):
+    return project_onto_equilibrium(balance, fn, ft, ConvexSettings(balance=EXACT * ConvexSettings().balance))
 
 
-def test_consistent_field_is_projected_strictly():
+def test_consistent_field_is_projected_exactly():
     fn, ft, balance = lattice()
     noisy = fn * (1 + 0.1 * np.random.default_rng(5).normal(size=len(fn)))
     found = project_mixed_field(balance, noisy, ft, 0.2 * fn, ConvexSettings())
-    np.testing.assert_array_equal(found.fn, project_strictly(balance, noisy, ft).fn)
+    np.testing.assert_array_equal(found.fn, project_exactly(balance, noisy, ft).fn)
 
 
 @pytest.mark.parametrize("left_out", [4, 8])
 def test_missing_pairs_do_not_remove_the_forces_around_them(left_out):
     fn, ft, balance = lattice(left_out)
     fn_sd = np.full(len(fn), 0.1 * fn.mean())
-    strict = project_strictly(balance, fn, ft)
-    assert change(strict, fn, fn_sd) > MAX_CHANGE
+    strict = project_exactly(balance, fn, ft)
+    assert change(strict, fn, fn_sd) > MAX_CHANGE_EXACT
     found = project_mixed_field(balance, fn, ft, fn_sd, ConvexSettings())
     assert change(found, fn, fn_sd) < 0.7 * change(strict, fn, fn_sd)
     assert np.corrcoef(found.fn, fn)[0, 1] > np.corrcoef(strict.fn, fn)[0, 1]
     assert np.all(np.abs(found.ft) <= 0.25 * found.fn)
 
 
-def test_change_of_few_standard_deviations_is_no_missing_pair():
+def test_change_of_a_standard_deviation_is_no_missing_pair():
     fn, ft, balance = lattice(left_out=4)
-    strict = project_strictly(balance, fn, ft)
-    fn_sd = np.full(len(fn), 1.2 * np.sqrt(np.mean((strict.fn - fn) ** 2)) / MAX_CHANGE)
-    np.testing.assert_array_equal(project_mixed_field(balance, fn, ft, fn_sd, ConvexSettings()).fn, strict.fn)
-    certain = project_mixed_field(balance, fn, ft, fn_sd / 4.0, ConvexSettings())
-    assert change(certain, fn, fn_sd) < change(strict, fn, fn_sd)
+    exact = project_exactly(balance, fn, ft)
+    fn_sd = np.full(len(fn), 1.2 * np.sqrt(np.mean((exact.fn - fn) ** 2)) / MAX_CHANGE_EXACT)
+    np.testing.assert_array_equal(project_mixed_field(balance, fn, ft, fn_sd, ConvexSettings()).fn, exact.fn)
+    certain = project_mixed_field(balance, fn, ft, fn_sd / 2.0, ConvexSettings())
+    assert change(certain, fn, fn_sd) < change(exact, fn, fn_sd)
 
 
-def test_hard_grains_that_all_find_balance_may_change_by_more(monkeypatch):
+def test_equilibrium_is_exact_for_hard_grains_that_all_find_it_and_else_strict(monkeypatch):
     fn, ft, balance = lattice()
     noisy = fn * (1 + 0.3 * np.random.default_rng(5).normal(size=len(fn)))
-    strict = project_strictly(balance, noisy, ft)
-    size = np.sqrt(np.mean((strict.fn - noisy) ** 2))
+    exact, strict = project_exactly(balance, noisy, ft), project_onto_equilibrium(balance, noisy, ft)
+    size = np.sqrt(np.mean((exact.fn - noisy) ** 2))
 
     def project(changed, *, soft=False):
         fn_sd = np.full(len(fn), size / changed)
         return project_mixed_field(balance, noisy, ft, fn_sd, ConvexSettings(), soft=soft).fn
 
-    between = 0.5 * (MAX_CHANGE + MAX_CHANGE_BALANCED)
-    np.testing.assert_array_equal(project(between), strict.fn)
-    assert np.abs(project(between, soft=True) - strict.fn).max() > 0.0
+    between = 0.5 * (MAX_CHANGE + MAX_CHANGE_EXACT)
+    np.testing.assert_array_equal(project(between), exact.fn)
     np.testing.assert_array_equal(project(0.9 * MAX_CHANGE, soft=True), strict.fn)
-    assert np.abs(project(1.1 * MAX_CHANGE_BALANCED) - strict.fn).max() > 0.0
+    for other in (exact, strict):  # equilibrium is relaxed
+        assert np.abs(project(between, soft=True) - other.fn).max() > 0.0
+        assert np.abs(project(1.1 * MAX_CHANGE_EXACT) - other.fn).max() > 0.0
     monkeypatch.setattr(equilibrium_projection, "MAX_RESIDUAL", 1e-9)  # no residual is that small
-    assert np.abs(project(between) - strict.fn).max() > 0.0
+    np.testing.assert_array_equal(project(0.9 * MAX_CHANGE), strict.fn)
+    assert np.abs(project(between) - exact.fn).max() > 0.0
 
 
 def test_equilibrium_is_relaxed_no_further_than_necessary(monkeypatch):
@@ -120,8 +122,8 @@ def test_equilibrium_is_relaxed_no_further_than_necessary(monkeypatch):
     ]
     size = [np.sqrt(np.mean((each - fn) ** 2)) for each in relaxed]
     assert size == sorted(size, reverse=True)
-    for name in ("MAX_CHANGE", "MAX_CHANGE_BALANCED"):
-        monkeypatch.setattr(equilibrium_projection, name, 0.0)  # strict equilibrium is never accepted
+    for name in ("MAX_CHANGE", "MAX_CHANGE_EXACT"):
+        monkeypatch.setattr(equilibrium_projection, name, 0.0)  # equilibrium is always relaxed
     fn_sd = np.full(len(fn), 1.01 * size[2] / MAX_CHANGE_RELAXED)
     found = project_mixed_field(balance, fn, ft, fn_sd, ConvexSettings())
     np.testing.assert_array_equal(found.fn, relaxed[2])
