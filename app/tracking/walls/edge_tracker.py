@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...experiment.pictures.image import Image
 from ...experiment.units import Scale
 from ...solver.bodies.grains import Array
-from .inner_edge import Edge, find_edge
+from .inner_edge import Edge, find_edge, inward_normal, move_inward
 from .surrounding_bars import MIN_ANGLE
 
 REACHES = (8.0, 20.0, 60.0)  # [px] from the expected place, tried one after another
@@ -85,12 +85,12 @@ class EdgeTracker:
         for reach in REACHES:
             for place in expected:
                 line = self.scale.to_pixels(place)
-                expected_edge = _moved(line, -self._offset[k])
+                expected_edge = move_inward(line, -self._offset[k])
                 edge = find_edge(image, expected_edge, reach)
                 if np.abs(_away(edge.line, expected_edge)).max() > 0.5 * reach:  # some profiles end before it
                     edge = find_edge(image, edge.line, REACHES[0])
                 if edge.is_seen and edge.contrast >= least:
-                    return _moved(edge.line, self._offset[k]), edge
+                    return move_inward(edge.line, self._offset[k]), edge
         return None
 
 
@@ -144,22 +144,11 @@ def _direction(bar: Array) -> Array:
     return np.asarray(along / np.linalg.norm(along, axis=1)[:, None])
 
 
-def _inward(line: Array) -> Array:
-    """Unit normal (2,) of a line (2, 2) [px], y down, towards its left in the world."""
-    along = line[1] - line[0]
-    return np.array([along[1], -along[0]]) / np.hypot(*along)
-
-
 def _away(line: Array, points: Array) -> Array:
     """Distances (2,) of points (2, 2) from a line (2, 2) [px], positive towards the packing."""
-    return np.asarray((points - line[0]) @ _inward(line))
-
-
-def _moved(line: Array, inward: Array) -> Array:
-    """The line (2, 2) [px] with its ends moved towards the packing by two distances (2,) [px]."""
-    return np.asarray(line + inward[:, None] * _inward(line))
+    return np.asarray((points - line[0]) @ inward_normal(line))
 
 
 def _feet(line: Array, points: Array) -> Array:
     """The points of a line (2, 2) nearest to points (2, 2)."""
-    return np.asarray(points - _away(line, points)[:, None] * _inward(line))
+    return np.asarray(points - _away(line, points)[:, None] * inward_normal(line))

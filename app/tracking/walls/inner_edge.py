@@ -25,6 +25,7 @@ MAX_SDS, LEAST_CUT = 2.0, 0.5  # standard deviations and [px] beyond which a cen
 NORMAL_MEDIAN = 0.6745  # standard deviations in the median deviation of normal errors
 MIN_CONTRAST = 0.5  # of an edge that is measured, over the strongest ones: between rods the bar borders on the dark
 MIN_PROFILES = 4
+ENDS = np.array([[1.0, -0.5], [1.0, 0.5]])  # offsets of a line's ends by that of its middle and their difference
 LEAST_SEEN = 0.34  # fraction of the profiles that must agree
 
 
@@ -86,30 +87,30 @@ def find_edge(image: Image, line: Array, max_shift: float) -> Edge:
     agree = float((strong & (np.abs(edge - fit[0] - fit[1] * place) < OUTLIER)).mean())
     chance = min(OUTLIER / max_shift, MOST_CHANCE)
     fraction = max(agree - chance, 0.0) / (1.0 - chance)
-    rough = _moved(given, fit)
+    rough = move_inward(given, ENDS @ fit)
     offset, slope = _slopes(smooth, rough - corner, place, CENTRED + OUTLIER)
     fit, sigma, contrast = _centre(place, offset, np.maximum(slope, 0.0))
-    return Edge(_moved(rough, fit), fraction, sigma, contrast)
+    return Edge(move_inward(rough, ENDS @ fit), fraction, sigma, contrast)
 
 
 def _slopes(smooth: Array, line: Array, place: Array, reach: float) -> tuple[Array, Array]:
     """Slopes (p, o) of profiles across a line at offsets (o,) [px] towards the packing; the bar is bright."""
     offset = np.arange(-reach, reach + STEP, STEP)
     middle = line.mean(axis=0) + place[:, None] * (line[1] - line[0])
-    points = middle[:, None] + offset[None, :, None] * _inward(line)
+    points = middle[:, None] + offset[None, :, None] * inward_normal(line)
     profile = map_coordinates(smooth, [points[..., 1], points[..., 0]], order=1, mode="nearest")
     return offset, -np.gradient(profile, STEP, axis=1)
 
 
-def _inward(line: Array) -> Array:
+def inward_normal(line: Array) -> Array:
     """Unit normal (2,) of a line (2, 2) [px], y down, towards its left in the world."""
     along = line[1] - line[0]
     return np.array([along[1], -along[0]]) / max(float(np.hypot(*along)), 1e-9)
 
 
-def _moved(line: Array, fit: Array) -> Array:
-    """The line (2, 2) moved towards the packing by an offset of its middle, and the difference of its ends' (2,)."""
-    return np.asarray(line + (fit[0] + fit[1] * np.array([[-0.5], [0.5]])) * _inward(line))
+def move_inward(line: Array, by: Array) -> Array:
+    """Move the ends of a line (2, 2) towards the packing by two distances (2,) [px]."""
+    return np.asarray(line + by[:, None] * inward_normal(line))
 
 
 def _centre(place: Array, offset: Array, slope: Array) -> tuple[Array, Array, float]:
@@ -132,8 +133,7 @@ def _centre(place: Array, offset: Array, slope: Array) -> tuple[Array, Array, fl
         fit = fit + change
         residual = shift[seen] - design @ change
         variance = float(residual @ residual) / max(len(residual) - 2, 1) * _correlated_count(residual)
-        ends = np.array([[1.0, -0.5], [1.0, 0.5]])
-        sigma = np.sqrt(variance * np.einsum("ea,ab,eb->e", ends, np.linalg.inv(design.T @ design), ends))
+        sigma = np.sqrt(variance * np.einsum("ea,ab,eb->e", ENDS, np.linalg.inv(design.T @ design), ENDS))
     return fit, sigma, median
 
 

@@ -75,6 +75,5 @@ def _rests(texture: Array, edge: Array, sigma: Array, pixel: float) -> NDArray[n
     normal = outward_normals(texture[0])
     across, edge_across = (np.einsum("fwek,wk->fwe", ends - ends[0], normal) for ends in (texture, edge))
     apart = np.abs(across - edge_across) > APART * pixel + SDS_APART * sigma
-    with np.errstate(invalid="ignore"):
-        moved, edge_moved = (np.nanmax(np.abs(np.nan_to_num(each)), axis=(0, 2)) for each in (across, edge_across))
+    moved, edge_moved = (np.abs(np.nan_to_num(each)).max(axis=(0, 2)) for each in (across, edge_across))
     return np.asarray(apart.any(axis=(0, 2)) & (moved < AT_REST * edge_moved))

@@ -121,7 +121,7 @@ MUTANTS = [
         "app/tracking/walls/inner_edge.py",
         "tests/app/tracking/walls/test_inner_edge.py",
         ("chance = min(OUTLIER / max_shift, MOST_CHANCE)", "chance = 0.0"),
-        ("return Edge(_moved(rough, fit), fraction", "return Edge(rough, fraction"),
+        ("return Edge(move_inward(rough, ENDS @ fit), fraction", "return Edge(rough, fraction"),
         ("max(len(residual) - 2, 1) * _correlated_count(residual)", "len(residual) ** 3"),
     ),
     *mutants_of(
@@ -133,7 +133,7 @@ MUTANTS = [
     *mutants_of(
         "app/tracking/walls/edge_tracker.py",
         "tests/app/tracking/walls/test_edge_tracker.py",
-        ("return _moved(edge.line, self._offset[k]), edge", "return edge.line, edge"),
+        ("return move_inward(edge.line, self._offset[k]), edge", "return edge.line, edge"),
         ("(place + beyond * along)[there]", "place[there]"),
         ("if not (far < NEAR_CORNER * length).any()", "if not len(far)"),
     ),
