@@ -11,6 +11,7 @@ from rich.table import Table
 
 from ..process.counts import state_count
 from ..solver.assessment.reasons import split_reasons
+from ..solver.convex.friction_check import LEAST_SLIDING
 from ..solver.even_subset import even_subset
 from ..solver.frame_forces import FrameStatus
 
@@ -97,9 +98,8 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
     friction = summary["friction"]
     if friction is not None and friction["enclosed"]:
         lines.append(friction_line(friction, [each["cause"] for each in summary.get("diagnosis", [])]))
-    elif friction is not None and friction.get("sliding") is not None:
-        sliding = f"{100.0 * friction['sliding']:.0f} % of the contacts slide by more than 1.5 standard deviations"
-        lines.append(f"Friction is used as given: the motion does not show it ({sliding}, by noise alone 13 %).")
+    elif friction is not None and friction.get("sliding") is not None and friction["sliding"] < LEAST_SLIDING:
+        lines.append(hidden_friction_line(friction["sliding"]))
     if summary.get("base_friction"):
         lines.append(f"Friction of the base that was used: {summary['base_friction']:.3g}.")
     if friction is not None and friction["walls"][0] is not None:
@@ -128,6 +128,12 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
                 f"r(f_t) {np.mean(late_t):.3f}.[/]"
             )
     return lines
+
+
+def hidden_friction_line(sliding: float) -> str:
+    """State that the motion does not show the friction, by the fraction of contacts that slide by more than noise."""
+    seen = f"{100.0 * sliding:.0f} % of the contacts slide by more than 1.5 standard deviations"
+    return f"The motion does not show the friction: {seen} of noise, by noise alone 13 %."
 
 
 def friction_line(friction: dict[str, Any], causes: list[str]) -> str:

@@ -16,6 +16,7 @@ from ...solver.convex.friction_check import (
     BIAS,
     COVERAGE_FACTOR,
     FRAMES,
+    LEAST_SLIDING,
     MIN_WALL_CONTACTS,
     QUIET,
     WALL_BIAS_SD,
@@ -50,9 +51,6 @@ POSSIBLE = (0.02, 2.0)  # range of the friction
 REACH = 0.04  # largest change of the radii, as a fraction of the mean radius
 CURVE_POINTS = 81
 ENOUGH_CONTACTS = 8000  # of all frames together, to measure friction on: more frames of a large packing add only time
-# Fraction of sliding contacts below which they do not show the friction: noise alone makes .13 of them slide. With .13
-# to .22 the estimate was .3 to 3.4 times the truth in seven packings, with .31 to .65 .9 to 1.1 times in ten others.
-LEAST_SLIDING = 0.25
 FEWEST_FRAMES = 4  # for an interval
 TOLERATED_LOSS = 0.005  # fraction of lost grains: their forces are missing from the balance
 

@@ -24,7 +24,7 @@ from rodsight.robustness.design import Case
 from rodsight.robustness.factors import FIRST_COMPARED
 from rodsight.robustness.study import Nominal, measure_case
 from rodsight.solver.assessment.expected_correlation import contradict
-from rodsight.solver.assessment.penalties import TRUST_OF_FEW
+from rodsight.solver.assessment.penalties import TRUST_OF_FEW, TRUST_WITHOUT_LOAD
 from rodsight.solver.bodies.wall_shapes import OUT
 from rodsight.solver.contacts.contacts import ContactSource
 from rodsight.solver.contacts.pairs import align
@@ -89,6 +89,15 @@ def test_a_named_cause_that_a_run_does_not_correct_lowers_the_trust_of_every_fra
         assert frame.trust_penalties.startswith(f"friction: {found.cure}")
         np.testing.assert_array_equal(frame.fn, before.fn)
         assert corrected.frames[k].trust == before.trust
+
+
+@pytest.mark.thorough
+def test_the_trust_of_a_packing_without_a_load_is_limited(contradicted):
+    inputs, plain = contradicted
+    results = infer_sequence(inputs, diagnosis=[finding("load_missing", "open at the top")])
+    assert max(contradict(each.trust) for each in plain.frames) > TRUST_WITHOUT_LOAD
+    assert max(each.trust for each in results.frames) <= TRUST_WITHOUT_LOAD
+    assert results.frames[2].trust_penalties.startswith("load missing: give the weight")
 
 
 @pytest.mark.slow

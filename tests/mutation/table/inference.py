@@ -155,6 +155,7 @@ MUTANTS = [
         ("penalise_friction(frames[k], check, measured=measured)", "frames[k]"),
         ("return limit_for_smoothing(frame) if smoothed else frame", "return frame"),
         ("in uncorrected(diagnosis))", "in diagnosis)"),
+        ("return frame if loaded else limit_for_missing_load(frame)", "return frame"),
         ("if words else assessed", "if False else assessed"),
         ("check.given, check.measured)", "check.measured, check.measured)"),
     ),
