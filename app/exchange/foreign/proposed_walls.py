@@ -18,6 +18,7 @@ from .simulations.lammps_dump import DumpData
 
 SIDES = ("bottom", "right", "top", "left")
 SIZES = (0.05, 50.0)  # of all walls together over that of the packing
+NEXT_TO_BAR = 5  # grains that show on which side of a bar the packing lies
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,11 +89,24 @@ def read_foreign_walls(file: Path, imported: ImportedTracks, convention: Convent
         raise InputError(file, f"frame {numbers[absent[0][0]]}", f"has no row of wall {names[absent[0][1]]!r}")
     _check_size(file, endpoints, imported.tracks, convention)
     endpoints = np.broadcast_to(endpoints, (len(imported.number), *endpoints.shape[1:])).copy()
-    centre = np.nanmean(imported.tracks.position, axis=1)[:, None]
-    along, inward = endpoints[:, :, 1] - endpoints[:, :, 0], centre - endpoints[:, :, 0]
-    right = along[..., 0] * inward[..., 1] - along[..., 1] * inward[..., 0] < 0.0
-    endpoints[right] = endpoints[right][:, ::-1]
+    for places, bars in zip(imported.tracks.position, endpoints, strict=True):
+        for k, bar in enumerate(bars):
+            bars[k] = bar[::-1] if _grains_lie_right(bar, places) else bar
     return Walls(names, endpoints, f"From {file.name}.")
+
+
+def _grains_lie_right(bar: Array, places: Array) -> bool:
+    """Whether the grains (n, 2) next to a bar (2, 2) lie to its right.
+
+    Those between its ends count: a face of a body inside the packing, as of a footing, may have its grains on the side
+    that faces away from the middle of the packing. All grains count where a bar has none between its ends.
+    """
+    along, place = bar[1] - bar[0], places - bar[0]
+    left = along[0] * place[:, 1] - along[1] * place[:, 0]
+    reached = place @ along / (along @ along)
+    between = np.flatnonzero((reached >= 0.0) & (reached <= 1.0))
+    nearest = between[np.argsort(np.abs(left[between]))[:NEXT_TO_BAR]]
+    return bool(np.nanmean(left[nearest] if len(nearest) else left) < 0.0)
 
 
 def _check_size(file: Path, endpoints: Array, tracks: Tracks, convention: Convention) -> None:

@@ -17,7 +17,8 @@ MUTANTS = [
     *mutants_of(
         "app/exchange/foreign/proposed_walls.py",
         TABLE,
-        ("inward[..., 0] < 0.0", "inward[..., 0] > 0.0"),
+        ("else left) < 0.0)", "else left) > 0.0)"),
+        ("np.argsort(np.abs(left[between]))[:NEXT_TO_BAR]", "np.argsort(np.abs(left[between]))"),
     ),
     *mutants_of(
         "app/exchange/foreign/pegs.py",

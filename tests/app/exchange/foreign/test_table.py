@@ -16,12 +16,13 @@ from .command import import_files, refuse, tracks_in, walls_in
 
 COLUMNS = "frame=t,id=rod,x=X,y=Y,theta=turn,radius=R"
 ROWS = [(5, "a", 10.0, 20.0, 350.0, 4.0), (5, "b", 18.0, 20.0, 0.0, 4.0), (7, "a", 11.0, 22.0, 5.0, 4.0)]
+COLUMN_NAMES = ["t", "rod", "X", "Y", "turn", "R"]
 PIXEL = 1e-3
 
 
 def write(file: Path, separator: str = ",", *, start: str = "", end: str = "\n", decimal: str = ".") -> Path:
     rows = [separator.join(str(cell).replace(".", decimal) for cell in row) for row in ROWS]
-    file.write_bytes((start + end.join([separator.join(("t", "rod", "X", "Y", "turn", "R")), *rows, ""])).encode())
+    file.write_bytes((start + end.join([separator.join(COLUMN_NAMES), *rows, ""])).encode())
     return file
 
 
@@ -114,7 +115,7 @@ def test_walls_that_stand_twice_or_in_another_unit_are_refused(tmp_path, capsys,
 
 
 def test_parquet_and_utf_16(tmp_path, capsys):
-    names = ("t", "rod", "X", "Y", "turn", "R")
+    names = COLUMN_NAMES
     table = pyarrow.table({name: [row[k] for row in ROWS] for k, name in enumerate(names)})
     pyarrow.parquet.write_table(table, tmp_path / "any.parquet")
     text = write(tmp_path / "any.csv").read_text()
@@ -193,6 +194,25 @@ def test_the_check_of_an_imported_table_names_no_column_of_the_importer(tmp_path
     )  # fmt: skip
     assert "number" in (tmp_path / "out/times.csv").read_text()
     assert rodsight.check(tmp_path / "out", predict=False)["unused"] == ()
+
+
+def test_the_faces_of_a_footing_have_their_grains_outside(tmp_path, capsys):
+    """Its left face stands in the right half of a packing, of which most grains lie to the left of both faces."""
+    at = [(x, y) for x in range(0, 100, 10) for y in range(0, 50, 10) if x not in (60, 70) or y < 20]
+    grains = pd.DataFrame([(5, k, x, y, 0.0, 5.0) for k, (x, y) in enumerate(at)], columns=COLUMN_NAMES)
+    grains.to_csv(tmp_path / "any.csv", index=False)
+    bars = {"left_face": (55, 20, 55, 45), "right_face": (75, 45, 75, 20), "base": (75, 15, 55, 15)}
+    rows = [f"5,{name},{','.join(map(str, ends))}" for name, ends in bars.items()]
+    (tmp_path / "bars.csv").write_text("\n".join(["frame,wall,x1,y1,x2,y2", *rows]))
+    import_files(
+        capsys, "table", tmp_path / "any.csv", tmp_path / "out", "--columns", COLUMNS, "--pixel-size", PIXEL,
+        "--walls", tmp_path / "bars.csv",
+    )  # fmt: skip
+    walls = walls_in(tmp_path / "out")
+    assert walls is not None
+    along = walls.endpoints[0, :, 1] - walls.endpoints[0, :, 0]
+    inward = {name: (-y, x) for name, (x, y) in zip(walls.name, np.sign(along), strict=True)}
+    assert inward == {"left_face": (-1.0, 0.0), "right_face": (1.0, 0.0), "base": (0.0, -1.0)}
 
 
 def test_y_is_measured_from_the_last_row_with_a_given_height(tmp_path, capsys):
