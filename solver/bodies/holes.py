@@ -41,7 +41,7 @@ def find_holes(grains: Grains, position: Array, present: NDArray[np.bool_], wall
         return np.empty((0, 2))
     centre, radius, least_radius = position[seen], grains.radius[seen], _least_radius(grains.radius)
     corner = Delaunay(centre).simplices
-    point = _equidistant_points(centre[corner], radius[corner])
+    point = equidistant_points(centre[corner], radius[corner])
     # The corners of its own triangle exclude nearly all points, without a search for the nearest centre.
     apart = np.hypot(*np.moveaxis(point[:, None] - centre[corner], 2, 0)).min(axis=1)
     point = point[apart - radius.min() >= least_radius]  # not where Newton's method left NaN
@@ -73,11 +73,25 @@ def _least_radius(radius: Array) -> float:
     return max(SMALLEST_FRACTION * float(radius.min()), LARGEST_FRACTION * float(radius.max()))
 
 
-def _equidistant_points(centre: Array, radius: Array) -> Array:
-    """Return points (h, 2) equidistant from three circles of centre (h, 3, 2) and radius (h, 3) (Newton's method)."""
+def equidistant_points(centre: Array, radius: Array, start: Array | None = None) -> Array:
+    """Compute points equidistant from three circles by Newton's method.
+
+    Parameters
+    ----------
+    centre : array (h, 3, 2)
+    radius : array (h, 3)
+    start : array (2,), optional
+        Where the iteration begins; None: in the middle of the centres.
+
+    Returns
+    -------
+    array (h, 2)
+        NaN or far away where there is none near the start.
+    """
     # One row per circle and component: numpy is slow on axes of length two and three.
     x, y, r = (np.ascontiguousarray(each.T) for each in (centre[..., 0], centre[..., 1], radius))
-    px, py = x.mean(axis=0), y.mean(axis=0)
+    middle = (x.mean(axis=0), y.mean(axis=0)) if start is None else np.broadcast_to(start[:, None], (2, len(centre)))
+    px, py = middle
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         for _ in range(NEWTON_STEPS):
             dx, dy = px - x, py - y

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
+from scipy.spatial import Delaunay, KDTree
 
 from ..bodies.grains import Array
+from ..bodies.holes import equidistant_points
 from ..bodies.wall_shapes import IN, STRAIGHT, Sides, all_sides, bounding_distance, circle_parameters
 
 NEIGHBOURS = 8  # whose mean motion a place follows
 NEAREST = 12  # centres that are tested for contact with a rod
 SAME_PLACE = 0.02  # radii: nearer places count as one
+AROUND_HOLE = 8  # bodies, by any three of which a rod of unknown size may be held
+TRIPLES = np.array(list(combinations(range(AROUND_HOLE), 3)))
+NARROWED = 0.7  # of the least size: three corners of a triangulation leave a circle of this size in a hole at least
+LEAST_GRAINS = 4  # that a triangulation needs
+UNCERTAIN_SIZE = 10.0  # standard deviations of a gap: three bodies on one side do not determine a size
 FLAT = 1e4  # radius of the circle that replaces a wall, over that of the greatest rod
 AROUND = 0.35  # of its radius: greatest gap of bodies that may hold a rod
 ROUNDS = 30  # of re-weighting
@@ -38,6 +46,7 @@ class Surroundings:
         self._widest = float(radius.max())
         self._rows = [np.flatnonzero(here) for here in present]
         self._tree = [KDTree(position[k][rows]) for k, rows in enumerate(self._rows)]
+        self._depth: dict[int, Array] = {}  # of grains (n, w) [m] from walls in a photograph
         self._walls, self._side = endpoints, all_sides(side, endpoints.shape[1])
 
     @property
@@ -73,11 +82,6 @@ class Surroundings:
             if np.max(change, initial=0.0, where=np.isfinite(change)) > least:
                 found.append(k)
         return np.array(found, np.intp)
-
-    def gaps(self, place: Array, k: int, size: float) -> Array:
-        """Compute the gaps (b,) [m] of a rod of this size at a place to the grains and walls around it."""
-        centre, rim = self._bodies(place, k, 2.0 * size)
-        return np.linalg.norm(centre - place, axis=1) - rim - size
 
     def find_places(self, k: int, size: float, apart: float, deep: float, near: Array | None) -> Array:
         """Find places (p, 2) in photograph k where a rod touches at least three bodies and overlaps none.
@@ -122,6 +126,124 @@ class Surroundings:
                 places.append(crossing[q])
         return np.array(places).reshape(-1, 2)
 
+    def find_circles(
+        self, k: int, sizes: tuple[float, float], deep: float, near: Array | None
+    ) -> list[tuple[Array, float]]:
+        """Find places in photograph k where a rod of unknown size would touch three bodies and overlap none.
+
+        Parameters
+        ----------
+        k : int
+            Photograph.
+        sizes : (float, float)
+            Least and greatest radius [m] of the rod.
+        deep : float
+            Greatest overlap [m] of a body that touches.
+        near : array (q, 2), optional
+            Search around these places [m] only; None: everywhere.
+
+        Returns
+        -------
+        list of (array (2,), float)
+            Places and radii [m], without duplicates.
+        """
+        least, greatest = sizes
+        found: list[tuple[Array, float]] = []
+        for hole in self._holes(k, sizes, near):
+            centre, rim = self._bodies(hole, k, 2.0 * greatest)
+            nearest = np.argsort(np.linalg.norm(centre - hole, axis=1) - rim)[:AROUND_HOLE]
+            three = nearest[TRIPLES[TRIPLES.max(axis=1) < len(nearest)]]
+            place = equidistant_points(centre[three], rim[three], hole)
+            clearance = np.linalg.norm(place[:, None] - centre, axis=2) - rim
+            size = np.take_along_axis(clearance, three, axis=1).mean(axis=1)
+            with np.errstate(invalid="ignore"):
+                fits = (size >= least) & (size <= greatest) & (clearance.min(axis=1) > size - deep)
+                fits &= np.linalg.norm(place - hole, axis=1) < greatest
+            for at, radius in zip(place[fits], size[fits].tolist(), strict=True):
+                if not any(np.hypot(*(at - x)) + abs(radius - r) < SAME_PLACE * radius for x, r in found):
+                    found.append((at, radius))
+        return found
+
+    def _holes(self, k: int, sizes: tuple[float, float], near: Array | None) -> Array:
+        """Find points (h, 2) in the holes of photograph k that may hold a rod of these sizes; near: as `find_circles`.
+
+        Notes
+        -----
+        Each triangle of a triangulation of the centres, and of their mirror images in the walls, leaves a circle
+        between its corners.
+        """
+        rows, (least, greatest) = self._rows[k], sizes
+        centre, rim = [self.position[k][rows]], [self.radius[rows]]
+        depth, outward = self._reach(k, centre[0])
+        for w in range(depth.shape[1]):
+            at = np.flatnonzero(depth[:, w] < rim[0] + 2.0 * greatest)
+            centre.append(centre[0][at] + 2.0 * depth[at, w, None] * outward[at, w])
+            rim.append(rim[0][at])
+        centre, rim = np.concatenate(centre), np.concatenate(rim)
+        if len(centre) < LEAST_GRAINS:
+            return np.empty((0, 2))
+        corner = Delaunay(centre).simplices
+        point = equidistant_points(centre[corner], rim[corner])
+        clearance = np.linalg.norm(point - centre[corner[:, 0]], axis=1) - rim[corner[:, 0]]
+        with np.errstate(invalid="ignore"):
+            point = point[(clearance > NARROWED * least) & (clearance < 2.0 * greatest)]
+        if near is not None and len(point):
+            point = point[np.asarray(KDTree(near).query(point)[0]) < self._widest + 2.0 * greatest]
+        one_of_each = np.unique(np.rint(point / (AROUND * least)), axis=0, return_index=True)[1]
+        return point[np.sort(one_of_each)]
+
+    def fit_size(self, place: Array, k: int, size: float, apart: float) -> tuple[float, float]:
+        """Fit the radius [m] of a rod near a place (2,) to the bodies within `apart` of it; return it and its weight.
+
+        The weight is the inverse of its variance over that of a gap; 0: fewer than three bodies determine it.
+        """
+        centre, rim = self._bodies(place, k, 2.0 * size)
+        away = centre - place
+        distance = np.linalg.norm(away, axis=1)
+        gap = distance - rim - size
+        touches = np.abs(gap) < apart
+        design = np.column_stack([away[touches] / distance[touches, None], np.ones(np.count_nonzero(touches))])
+        normal = design.T @ design
+        if len(design) < 3 or np.linalg.cond(normal) > UNCERTAIN_SIZE**4:
+            return size, 0.0
+        covariance = np.linalg.inv(normal)
+        if covariance[2, 2] > UNCERTAIN_SIZE**2:
+            return size, 0.0
+        return size + float(covariance[2] @ design.T @ gap[touches]), 1.0 / float(covariance[2, 2])
+
+    def count_rearranged(self, position: Array, size: float, apart: float, least: float) -> int:
+        """Count contacts beyond two of a rod in photographs between which the bodies that touch it rearrange.
+
+        Parameters
+        ----------
+        position : array (f, 2)
+            Of the rod [m].
+        size, apart : float
+            Radius of the rod, and greatest distance of surfaces that touch [m].
+        least : float
+            Least change [m] of a distance between two touching bodies since the photograph that was counted last.
+        """
+        last, total = -1, 0
+        for k, place in enumerate(position):
+            apart_now = np.linalg.norm(self.position[k] - place, axis=1) - self.radius - size
+            grains = np.flatnonzero(self.present[k] & (np.abs(apart_now) < apart))
+            walls = np.flatnonzero(np.abs(self._reach(k, place[None])[0][0] - size) < apart)
+            further = len(grains) + len(walls) - 2
+            if further <= 0:
+                continue
+            if last >= 0:
+                change = np.abs(self._spacing(k, grains, walls) - self._spacing(last, grains, walls))
+                if not np.max(change, initial=0.0, where=np.isfinite(change)) > least:
+                    continue
+            last, total = k, total + further
+        return total
+
+    def _spacing(self, k: int, grains: NDArray[np.intp], walls: NDArray[np.intp]) -> Array:
+        """Distances [m] between grains, and of these from walls, in photograph k; NaN of grains that it lacks."""
+        place = np.where(self.present[k, grains, None], self.position[k, grains], np.nan)
+        between = np.linalg.norm(place[:, None] - place, axis=2)
+        return np.concatenate([between.ravel(), self._reach(k, place)[0][:, walls].ravel()])
+
     def _crossings(self, k: int, size: float, near: Array | None) -> Array:
         """Compute places (p, 2) where a rod of this size touches two grains, or a grain and a wall."""
         rows, tree = self._rows[k], self._tree[k]
@@ -148,7 +270,11 @@ class Surroundings:
             found.append(_cross(centre[at], rim[at] + size, wall, np.full(len(at), wide)))
         return np.concatenate(found)
 
-    def hold(self, start: Array, k: int, size: float) -> tuple[Array, float]:
+    def bodies(self, place: Array, k: int, size: float) -> tuple[Array, Array]:
+        """Return centres (b, 2) and radii (b,) [m] of what a rod of this size may touch near a place (2,)."""
+        return self._bodies(place, k, (2.0 + MOVED) * size)
+
+    def hold(self, bodies: tuple[Array, Array], start: Array, size: float) -> tuple[Array, float]:
         """Fit the place of a rod near `start` (2,) to the bodies around it; return it and its standard deviation [m].
 
         Notes
@@ -156,13 +282,14 @@ class Surroundings:
         The place x minimises Σ w g²/σ² + |x − start|²/(0.1 R)² by Gauss-Newton steps, g the gaps and σ their noise;
         w = 1 for overlaps, (1 + (g/s)²)⁻² for gaps, with s shrinking to the noise.
         """
-        centre, rim = self._bodies(start, k, (2.0 + MOVED) * size)
-        x, y, variance = _hold(centre, rim, start, size, self.noise)
+        x, y, variance = _hold(*bodies, start, size, self.noise)
         return np.array([x, y]), float(np.sqrt(variance))
 
     def _bodies(self, place: Array, k: int, reach: float) -> tuple[Array, Array]:
         """Return centres (b, 2) and radii (b,) [m] of grains with rims within reach of a place and of all walls."""
         rows = self._rows[k][self._tree[k].query_ball_point(place, reach + self._widest)]
+        if len(rows) and self._is_far_from_walls(k, place, rows[0], reach):
+            return self.position[k][rows], self.radius[rows]
         depth, outward = self._reach(k, place[None])
         bounds = np.isfinite(depth[0])
         flat = self._flat(depth[0, bounds], outward[0, bounds], np.broadcast_to(place, (int(bounds.sum()), 2)))
@@ -171,6 +298,14 @@ class Surroundings:
             np.concatenate([self.radius[rows], np.full(len(flat), FLAT * self._widest)]),
         )
 
+    def _is_far_from_walls(self, k: int, place: Array, row: int, reach: float) -> bool:
+        """Whether a place (2,) is farther than `reach` from all walls, as its distance from a grain shows."""
+        if k not in self._depth:
+            self._depth[k] = np.full((len(self.radius), self._walls.shape[1]), np.nan)
+            self._depth[k][self._rows[k]] = self._reach(k, self.position[k][self._rows[k]])[0]
+        depth = self._depth[k][row]
+        return bool(np.isfinite(depth).all() and depth.min() - np.hypot(*(self.position[k, row] - place)) > reach)
+
     def _reach(self, k: int, place: Array) -> tuple[Array, Array]:
         """Compute distances (p, w) [m] of places (p, 2) from the walls in photograph k, and outward normals."""
         return bounding_distance(self._walls[k], self._side, place)
@@ -178,6 +313,12 @@ class Surroundings:
     def _flat(self, depth: Array, outward: Array, near: Array) -> Array:
         """Compute centres (m, 2) of large circles that replace the wall at `depth` (m,) [m] beyond places (m, 2)."""
         return near + (depth + FLAT * self._widest)[:, None] * outward
+
+
+def gaps(bodies: tuple[Array, Array], place: Array, size: float) -> Array:
+    """Compute the gaps (b,) [m] of a rod of this size at a place (2,) to bodies."""
+    centre, rim = bodies
+    return np.linalg.norm(centre - place, axis=1) - rim - size
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

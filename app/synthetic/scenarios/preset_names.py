@@ -12,7 +12,7 @@ ScenarioName = Literal[
     "shear", "sheared", "biaxial", "isotropic", "rising_loads", "rising_corners", "gravity",
     "soft", "softer", "soft_radii_03", "soft_radii_1", "soft_noise", "softer_noise",
     "soft_stretched", "softer_stretched", "soft_unseen", "nearly_jammed",
-    "corners", "short_walls", "unseen", "camera", "centres", "radii_03", "radii_1", "radius_offset",
+    "corners", "short_walls", "unseen", "biaxial_unseen", "camera", "centres", "radii_03", "radii_1", "radius_offset",
     "mu_low", "mu_high", "step_05", "step_1", "ten_frames", "periodic", "outer", "circle", "loads",
     "outer_biaxial", "outer_isotropic", "outer_gravity", "outer_moving", "outer_noise_40", "outer_radii_03",
     "outer_theta_sign", "outer_mu_05", "unknown_load",

@@ -209,6 +209,7 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     "corners": Scenario("shear; walls end where the bars meet", SHEAR, state_corners),
     "short_walls": Scenario("shear; the side walls are stated 13 % too short", SHEAR, misstate_wall_ends),
     "unseen": Scenario("shear; 3 % of the rods are in no photograph", SHEAR, omit_rods),
+    "biaxial_unseen": Scenario("biaxial; 3 % of the rods, of unknown size, are in no photograph", BIAXIAL, omit_rods),
     "camera": Scenario("shear; every photograph is shifted by up to 60 µm relative to the walls", SHEAR, move_camera),
     "centres": Scenario("shear; centres with 50 µm error fixed in the rod, precision stated so", SHEAR,
                      displace_centres),

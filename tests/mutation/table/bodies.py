@@ -60,11 +60,17 @@ MUTANTS = [
         ("0.5 * (xx + yy) / (xx * yy - xy * xy)", "0.5 / (xx + yy)"),
         ("change = np.abs(distance[k] - distance[found[-1]])", "change = np.abs(distance[k] - distance[0])"),
         ("np.where(self.present[:, nearest, None], self.position[:, nearest], np.nan)", "self.position[:, nearest]"),
+        ("clearance.min(axis=1) > size - deep", "clearance.min(axis=1) > size - greatest"),
+        ("size + float(covariance[2] @ design.T @ gap[touches])", "size"),
+        ("last, total = k, total + further", "last, total = 0, total + further"),
+        ("depth.min() - np.hypot(*(self.position[k, row] - place)) > reach", "depth.min() > reach"),
     ),
     *mutants_of(
         "solver/inferred/unseen_rods.py",
         "tests/solver/inferred/test_unseen_rods.py",
         ("rod.contacts[around.find_changed(rod.position, tolerance.exact)].sum()", "rod.contacts.sum()"),
+        ("demanded=exact and anew >= LEAST_REARRANGED", "demanded=anew >= LEAST_REARRANGED"),
+        ("demanded=exact and anew >= LEAST_REARRANGED", "demanded=exact"),
     ),
     *mutants_of(
         "solver/bodies/packing.py",

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from rodsight.solver.bodies.grains import Array
-from rodsight.solver.inferred.surroundings import Surroundings
+from rodsight.solver.inferred import unseen_rods
+from rodsight.solver.inferred.surroundings import Surroundings, gaps
 from rodsight.solver.inferred.unseen_rods import UnseenRods, UnseenRodSettings, infer_unseen
 
 from tests.golden.forces import NOISE, STORED
@@ -40,6 +41,17 @@ def test_removed_rods_are_inferred(poses) -> None:
         assert away[best] < 0.05 * poses["radius"][rod]
         assert found.radius[best] == pytest.approx(poses["radius"][rod], rel=0.01)
         assert np.all(found.sigma[:, best] < 4 * NOISE)
+
+
+def test_removed_rods_of_unknown_size_are_inferred(poses) -> None:
+    found = infer(poses, GONE, None)
+    true = poses["position"][:, list(GONE)]
+    for q, rod in enumerate(GONE):
+        away = np.linalg.norm(found.position - true[:, None, q], axis=2).max(axis=0)
+        best = int(np.argmin(away))
+        assert away[best] < 0.05 * poses["radius"][rod]
+        assert found.radius[best] == pytest.approx(poses["radius"][rod], rel=0.005)
+    assert infer(poses, (), None).count == 0
 
 
 @pytest.mark.slow
@@ -77,18 +89,29 @@ def test_two_photographs_are_not_enough(poses) -> None:
     assert infer(short, GONE, np.unique(poses["radius"])).count == 0
 
 
-def ring(closing: float, touching: int = 6, turning: float = 0.0, moving: float = 0.0, frames: int = 4) -> UnseenRods:
+def ring(
+    closing: float,
+    touching: int = 6,
+    turning: float = 0.0,
+    moving: float = 0.0,
+    frames: int = 4,
+    *,
+    known: bool = True,
+    wandering: float = 0.0,
+) -> UnseenRods:
     """Infer rods inside a ring of six around a hole of their size, one of which moves inward after two frames.
 
-    touching: of the six, the others are too far out; turning [rad], moving (along the ring, of a radius): per frame.
+    touching: of the six, the others are too far out; turning [rad], moving (along the ring, of a radius): per frame;
+    known: their size; wandering [m]: of those that touch, outward and inward in turn.
     """
     r = 8e-3
-    angle = np.pi / 3 * np.arange(6)
+    angle = np.pi / 3 * np.array([0, 2, 4, 1, 3, 5])
     around = 2 * r * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     far = np.array([[0.05, 0.05], [-0.05, 0.05], [-0.05, -0.05], [0.05, -0.05]])
     position = np.tile(np.concatenate([around, far]), (frames, 1, 1))
     position[2:, 0] *= 1.0 - closing
     position[:, touching:6] *= 1.05
+    position[1::2, :touching] *= 1.0 + wandering / (2.0 * r)
     for k in range(frames):
         turned = np.array([k * turning, k * turning + k * moving / 2.0])  # the rod 0 along the ring
         for rods, by in ((slice(0, 10), turned[0]), (slice(0, 1), turned[1] - turned[0])):
@@ -97,8 +120,9 @@ def ring(closing: float, touching: int = 6, turning: float = 0.0, moving: float 
     side = np.array([[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]])
     walls = np.tile(np.stack([side, np.roll(side, -1, axis=0)], axis=1), (frames, 1, 1, 1))
     return infer_unseen(
-        np.full(10, r), position, np.ones((frames, 10), bool), walls, UnseenRodSettings(NOISE, np.array([r]))
-    )
+        np.full(10, r), position, np.ones((frames, 10), bool), walls,
+        UnseenRodSettings(NOISE, np.array([r]) if known else None),
+    )  # fmt: skip
 
 
 def test_hole_that_other_rods_enter_holds_no_rod() -> None:
@@ -116,6 +140,59 @@ def test_contacts_that_stay_the_same_count_once() -> None:
     assert ring(closing=0.0, touching=3, turning=0.05, frames=6).count == 0
     assert ring(closing=0.0, touching=3, moving=-0.02, frames=6).count == 1
     assert ring(closing=0.0, touching=4, turning=0.05, frames=6).count == 1  # held by two beyond any two
+
+
+def test_a_size_that_is_unknown_is_that_on_which_bodies_agree_while_they_rearrange(monkeypatch) -> None:
+    assert ring(closing=0.0, touching=3, moving=-0.03, frames=8, known=False).count == 1
+    assert ring(closing=0.0, touching=3, turning=0.05, frames=8, known=False).count == 0
+    assert ring(closing=0.0, touching=3, moving=-0.03, frames=8, known=False, wandering=2.0 * NOISE).count == 1
+    monkeypatch.setattr(unseen_rods, "SIZE_MISFIT", 0.5)  # an amplitude of one standard deviation is more
+    assert ring(closing=0.0, touching=3, moving=-0.03, frames=8, known=False, wandering=2.0 * NOISE).count == 0
+
+
+def test_circles_of_unknown_size_touch_three_bodies_and_overlap_none() -> None:
+    around = box(np.array([[-0.02, 0.0], [0.02, 0.0], [0.0, 0.02], [0.0, -0.015], [0.06, 0.06]]))
+    found = sorted(around.find_circles(0, (4e-3, 1.05e-2), 1e-6, None), key=lambda each: each[0][0])
+    x = 2.5e-3  # of circles that touch one at the side, and those above and below
+    assert [size for _, size in found] == pytest.approx([np.hypot(x, 0.0175) - 0.01] * 2)
+    assert np.array([at for at, _ in found]) == pytest.approx(np.array([[-x, x], [x, x]]))
+    assert around.find_circles(0, (4e-3, 7e-3), 1e-6, None) == []
+    assert around.find_circles(0, (4e-3, 9e-3), 1e-6, np.array([[0.09, 0.09]])) == []
+
+
+def test_a_size_is_fitted_to_the_bodies_that_touch() -> None:
+    angle = np.radians([0.0, 120.0, 240.0])
+    around = box(0.018 * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    size, weight = around.fit_size(np.array([2e-5, 0.0]), 0, 7.95e-3, 1e-4)
+    assert size == pytest.approx(8e-3, abs=1e-7)
+    assert weight == pytest.approx(3.0, rel=1e-2)
+    assert around.fit_size(np.zeros(2), 0, 7.5e-3, 1e-4)[1] == 0.0  # none touches
+
+
+def test_contacts_count_where_the_bodies_that_touch_rearrange() -> None:
+    angle = np.radians([0.0, 120.0, 240.0])
+    ring_of_three = 0.018 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    position = np.tile(ring_of_three, (6, 1, 1))
+    for k, turned in enumerate(np.radians([0.0, 0.0, 2.0, 4.0, 4.0, 2.0])):  # of the first, along the ring
+        position[k, 0] = 0.018 * np.array([np.cos(turned), np.sin(turned)])
+    assert box(position).count_rearranged(np.zeros((6, 2)), 8e-3, 1e-4, 1e-4) == 4
+    assert box(position).count_rearranged(np.zeros((6, 2)), 8e-3, 1e-4, 5e-4) == 2
+    assert box(position).count_rearranged(np.zeros((6, 2)), 7e-3, 1e-4, 1e-4) == 0  # nothing touches
+
+
+def test_a_wall_is_around_a_place_although_it_is_far_from_the_grains_there() -> None:
+    around = box(np.array([[0.035, 0.0]]))
+    assert len(around.bodies(np.array([0.08, 0.0]), 0, 0.015)[0]) == 5
+    assert len(around.bodies(np.array([0.01, 0.0]), 0, 0.008)[0]) == 1
+
+
+def box(position: np.ndarray) -> Surroundings:
+    """Grains of radius .01 at (n, 2) or (f, n, 2) in a box of .2 around the origin."""
+    position = position if position.ndim == 3 else position[None]
+    side = np.array([[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]])
+    walls = np.tile(np.stack([side, np.roll(side, -1, axis=0)], axis=1), (len(position), 1, 1, 1))
+    f, n = position.shape[:2]
+    return Surroundings(np.full(n, 0.01), position, np.ones((f, n), bool), walls, NOISE)
 
 
 def test_the_photographs_in_which_the_grains_around_rearrange_are_found() -> None:
@@ -139,5 +216,6 @@ def test_only_walls_that_bound_a_place_are_around_it() -> None:
     halves = np.array([[[[0.2, 0.0], [0.2, 0.1]], [[0.205, 0.1], [0.205, 0.2]]]])
     rod = np.array([[[0.05, 0.05]]])
     around = Surroundings(np.array([0.01]), rod, np.ones((1, 1), bool), halves, NOISE)
-    assert around.gaps(np.array([0.203, 0.15]), 0, 0.01) == pytest.approx([-0.008], abs=1e-6)  # in the shifted half
-    assert around.gaps(np.array([0.19, 0.15]), 0, 0.01) == pytest.approx([0.0, 0.005], abs=1e-6)
+    for x, expected in ((0.203, [-0.008]), (0.19, [0.0, 0.005])):  # in the shifted half, and before both
+        place = np.array([x, 0.15])
+        assert gaps(around.bodies(place, 0, 0.01), place, 0.01) == pytest.approx(expected, abs=1e-6)
