@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .estimate import Estimate
+from ..bodies.grains import Array
+from ..bodies.walls import Walls
+from ..contacts.contacts import Contacts
+from ..statistics.stress import contact_force_vectors
 from .frame_problem import FrameProblem
 
 AT_PLATE = 0.3  # radii: greatest gap of a boundary rod that is held by the plate: glue is no thinner
@@ -17,30 +20,37 @@ GLUED = 0.3  # fraction of the plate's width, by rods of the boundary, from whic
 LEAST_BORNE = 0.1  # of the load: what is read from less is noise
 
 
-def scale_to_load(problem: FrameProblem, estimate: Estimate) -> float:
+def scale_to_load(problem: FrameProblem, walls: Walls, contacts: Contacts, fn: Array, ft: Array) -> float:
     """Return the factor by which the forces of a frame agree with the load on its only plate; 1 where nothing is known.
+
+    Parameters
+    ----------
+    problem : FrameProblem
+    walls : Walls
+        Of the frame.
+    contacts : Contacts
+    fn, ft : array (c,)
+        Forces at the contacts [N].
 
     Notes
     -----
     L = n·Σ f with n the outward normal of the plate and f the forces of free rods on it and on the boundary rods that
     touch it. Without weight the forces of a frame are known up to a factor otherwise, so that one factor restores it.
     """
-    packing, snapshot, contacts = problem.packing, problem.snapshot, estimate.contacts
+    packing, snapshot = problem.packing, problem.snapshot
     boundary = packing.grains.boundary
     load = packing.load(snapshot.endpoints, snapshot.side, snapshot.load)
     loaded = np.flatnonzero(np.isfinite(load))
     if boundary is None or len(loaded) != 1 or any(packing.material.gravity):
         return 1.0
     w, n = int(loaded[0]), packing.grains.count
-    walls = estimate.step.walls
     radius = packing.grains.radius
     distance, _ = walls.distance(np.full(n, w), snapshot.position)
     beside = snapshot.present & (np.abs(distance - radius) < AT_PLATE * radius)
     at_plate = boundary & beside
     if walls.curved[w] or not at_plate.any() or radius[at_plate].sum() < GLUED * radius[beside].sum():
         return 1.0
-    force = estimate.fn[:, None] * contacts.normal + estimate.ft[:, None] * contacts.tangent
-    along = force @ walls.outward[w]
+    along = contact_force_vectors(contacts, fn, ft) @ walls.outward[w]
     first, second = at_plate[contacts.i], np.append(at_plate, np.zeros(walls.count, np.bool_))[contacts.j]
     borne = float(along[contacts.j == n + w].sum() + along[second & ~first].sum() - along[first & ~second].sum())
     return float(load[w] / borne) if borne > LEAST_BORNE * load[w] > 0.0 else 1.0

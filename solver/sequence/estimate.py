@@ -36,6 +36,7 @@ from ..posterior.frame_posterior import FramePosterior
 from ..statistics.agreement import pearson
 from ..statistics.balance import worst_force_residual
 from ..statistics.stress import love_weber_stress, packing_area
+from .boundary_load import scale_to_load
 from .ensemble import EnsembleState, solve_ensemble
 from .frame_problem import FrameProblem, PositionEstimates
 from .missing_contacts import NO_MISSING, MissingContacts
@@ -256,12 +257,17 @@ def _mix(
 
 
 def mean_stress(problem: FrameProblem, estimate: Estimate) -> float:
-    """Half the trace of the stress of the motion estimate [Pa], comparable from frame to frame."""
+    """Half the trace of the stress of the motion estimate [Pa] under the load, comparable from frame to frame."""
     fn, ft = (estimate.fn, estimate.ft) if estimate.motion is None else (estimate.motion.fn, estimate.motion.ft)
     position, walls = problem.snapshot.position, estimate.step.walls
     area = packing_area(walls, position[problem.snapshot.present])
     stress = love_weber_stress(estimate.contacts, fn, ft, position, area, problem.packing.length)
-    return 0.5 * float(np.trace(stress))
+    return 0.5 * float(np.trace(stress)) * load_scale(problem, estimate)
+
+
+def load_scale(problem: FrameProblem, estimate: Estimate) -> float:
+    """Factor by which the forces agree with the load on a plate."""
+    return scale_to_load(problem, estimate.step.walls, estimate.contacts, estimate.fn, estimate.ft)
 
 
 def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceState) -> Evidence:
@@ -271,7 +277,7 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
     load = packing.mean_pressure(snapshot)
     # A return from a faulty frame is no jump, nor is a change of the measured loads.
     load_ratio = packing.load_ratio(snapshot, problem.sequence.snapshots[max(problem.k - 1, 0)])
-    former = [load_ratio * p for p in (state.pressure, state.sound_pressure) if p > 0]
+    former = [load_ratio * p for p in (state.pressure, state.sound_pressure) if p > 0 and not problem.scale_is_open]
     jump = min((abs(pressure - p) / p for p in former), default=np.nan)
     return Evidence(
         reset=len(state.members.soft.key) == 0,

@@ -18,8 +18,7 @@ from ..frame_forces import FrameForces, FrameStatus
 from ..nlgs.force_memory import ForceMemory
 from ..statistics.agreement import relative_change
 from ..statistics.force_statistics import mean_normal_force
-from .boundary_load import scale_to_load
-from .estimate import Estimate, estimate_frame, mean_stress
+from .estimate import Estimate, estimate_frame, load_scale, mean_stress
 from .frame_problem import FrameProblem, SequenceProblem
 from .frame_report import find_ages, report_frame
 from .state import SequenceState
@@ -71,7 +70,7 @@ def solve_frame(problem: FrameProblem, state: SequenceState) -> tuple[FrameForce
     mean = mean_normal_force(frame.fn)
     if problem.scale_is_open and mean > 0.0:  # that of the chain differs from frame to frame without a cause
         frame = frame.scaled(1.0 / mean)
-    elif (factor := scale_to_load(problem, estimate)) != 1.0:
+    elif (factor := load_scale(problem, estimate)) != 1.0:
         frame = frame.scaled(factor)
     pressure = mean_stress(problem, estimate) if problem.motion.ends_here else np.nan
     return frame, SequenceState(

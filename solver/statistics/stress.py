@@ -10,6 +10,7 @@ from ..bodies.wall_shapes import IN, OUT
 from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts
 
+PARALLEL = np.radians(10.0)  # greatest angle between walls of one side, as the halves of a box that is split
 CORNERS = 2048  # of the polygon that approximates a circle
 
 
@@ -60,9 +61,8 @@ def _area_in_circle(walls: Walls, circle: int) -> float:
 
 
 def _area_between_lines(walls: Walls, straight: NDArray[np.intp], fallback: Array) -> float:
-    if len(straight) >= 3:
-        direction = walls.direction[straight]
-        order = straight[np.argsort(np.arctan2(direction[:, 1], direction[:, 0]))]
+    order = _sides(walls, straight)
+    if len(order) >= 3:
         start, direction = walls.endpoints[order, 0], walls.direction[order]
         corners = np.empty_like(start)
         for k in range(len(order)):
@@ -78,6 +78,17 @@ def _area_between_lines(walls: Walls, straight: NDArray[np.intp], fallback: Arra
     from scipy.spatial import ConvexHull
 
     return float(ConvexHull(fallback).volume)
+
+
+def _sides(walls: Walls, straight: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Straight walls (s,) in the order of their directions, of nearly parallel ones the longest: halves of one side."""
+    angle = np.arctan2(walls.direction[straight, 1], walls.direction[straight, 0])
+    kept: list[int] = []
+    for k in np.argsort(-walls.length[straight], kind="stable"):
+        apart = np.abs((angle[kept] - angle[k] + np.pi) % (2.0 * np.pi) - np.pi)
+        if (apart > PARALLEL).all():
+            kept.append(int(k))
+    return straight[np.array(sorted(kept, key=lambda k: angle[k]), np.intp)]
 
 
 def contact_force_vectors(contacts: Contacts, fn: Array, ft: Array) -> Array:

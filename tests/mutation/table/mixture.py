@@ -78,6 +78,11 @@ MUTANTS = [
     ),
     *mutants_of(
         "solver/sequence/estimate.py",
+        "tests/solver/sequence/test_frames.py",
+        (" if p > 0 and not problem.scale_is_open]", " if p > 0]"),
+    ),
+    *mutants_of(
+        "solver/sequence/estimate.py",
         "tests/solver/sequence/test_mixed_total.py",
         ("weight = evident_position_weight(evidence) if hard else None", "weight = None"),
         ("hard = not (problem.settings.soft or", "hard = not ("),

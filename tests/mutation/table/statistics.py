@@ -17,6 +17,7 @@ MUTANTS = [
         "solver/statistics/stress.py",
         STATISTICS,
         ("/ (area * length)", "/ area"),
+        ("if (apart > PARALLEL).all():", "if (apart > 0.0).all():"),
         ("end[pair] = contacts.second_centre(position)[pair]", "end[pair] = contacts.point[pair]"),
         ("float(np.arcsin(np.clip((major - minor)", "float(np.arctan(np.clip((major - minor)"),
         ("return float(values[1]), float(values[0]), angle", "return float(values[0]), float(values[1]), angle"),

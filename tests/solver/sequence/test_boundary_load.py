@@ -51,7 +51,7 @@ def test_rods_glued_to_a_plate_bear_their_part_of_its_load(glued, monkeypatch) -
     sheared, packing = glued
     assert packing.grains.boundary.sum() > 5
     right = np.array(scales(sheared, packing))
-    monkeypatch.setattr(frames, "scale_to_load", lambda *_: 1.0)
+    monkeypatch.setattr(frames, "load_scale", lambda *_: 1.0)
     by_width = np.array(scales(sheared, packing))
     assert np.abs(right - 1.0)[1:].max() < 0.15
     assert np.abs(by_width - 1.0)[1:].max() > 0.2
@@ -69,11 +69,8 @@ def problem_of(boundary=(1, 0, 0, 1, 0), pressure=(np.nan, 1000.0), gravity=(0.0
         i=np.array([0, 2, 1, 2]), j=np.array([1, 3, 5, 5]),
         normal=np.array([[0.0, -1.0], [0.0, 1.0], [0.0, -1.0], [0.0, -1.0]]), tangent=np.array([[1.0, 0.0]] * 4),
     )  # fmt: skip
-    estimate = SimpleNamespace(
-        contacts=contacts, fn=np.array([300.0, 200.0, 300.0, 200.0]), ft=np.zeros(4),
-        step=SimpleNamespace(walls=Walls.at_rest(ends)),
-    )  # fmt: skip
-    return SimpleNamespace(packing=packing, snapshot=snapshot), estimate
+    fn, ft = np.array([300.0, 200.0, 300.0, 200.0]), np.zeros(4)
+    return SimpleNamespace(packing=packing, snapshot=snapshot), Walls.at_rest(ends), contacts, fn, ft
 
 
 def test_glued_rods_bear_the_load_wherever_they_stand_in_a_pair():

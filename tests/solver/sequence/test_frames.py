@@ -360,3 +360,6 @@ def test_the_return_from_a_faulty_frame_is_no_jump_of_the_stress():
     never_sound = replace(faulty, sound_pressure=np.nan)
     (_, jumped), *_ = run(packing, snapshots, part=SequencePart(3, [never_sound]))
     assert jumped.evidence.pressure_jump > after.evidence.pressure_jump
+    unloaded = replace(packing, pressure=np.full_like(packing.pressure, np.nan))  # its scale is arbitrary
+    (_, arbitrary), *_ = run(unloaded, snapshots, part=SequencePart(3, [never_sound]))
+    assert np.isnan(arbitrary.evidence.pressure_jump)
