@@ -77,9 +77,10 @@ def test_area_of_a_sheared_box_is_that_of_its_parallelogram():
 @pytest.mark.parametrize("turned", [-2e-4, 0.0, 2e-4])
 def test_halves_of_a_side_are_one_side_of_the_area(turned):
     """Lines that are nearly parallel meet far away, so that their polygon has any area."""
-    c = np.array([[0.0, 0.0], [0.5, 0.0], [0.5, 0.25], [0.5 + 0.35 * turned, 0.6], [0.0, 0.6]])
-    walls = Walls(np.stack([c, np.roll(c, -1, axis=0)], axis=1), np.zeros((5, 2, 2)), np.full(5, np.nan))
-    assert packing_area(walls, c) == pytest.approx(0.3, rel=1e-3)
+    c = np.array([[0.0, 0.0], [0.5, 0.0], [0.5, 0.25], [0.51, 0.25], [0.51 + 0.35 * turned, 0.6], [0.0, 0.6]])
+    ends = np.stack([c, np.roll(c, -1, axis=0)], axis=1)[[0, 1, 3, 4, 5]]  # the upper half is displaced
+    walls = Walls(ends, np.zeros((5, 2, 2)), np.full(5, np.nan))
+    assert packing_area(walls, c) == pytest.approx(0.51 * 0.6, rel=1e-3)
 
 
 def test_rattlers_are_removed_until_none_is_left():
