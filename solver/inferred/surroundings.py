@@ -62,27 +62,6 @@ class Surroundings:
             return place
         return place + np.mean(self.position[to, rows] - self.position[k, rows], axis=0)
 
-    def find_changed(self, place: Array, least: float) -> NDArray[np.intp]:
-        """Find the photographs, the first among them, between which the grains around a moving place rearrange.
-
-        Parameters
-        ----------
-        place : array (f, 2)
-            The place [m] in every photograph.
-        least : float
-            Least change [m] of a distance between two of the nearest grains since the photograph found before.
-        """
-        away = np.linalg.norm(self.position - place[:, None], axis=2) - self.radius
-        nearest = np.argsort(np.where(self.present, away, np.inf).min(axis=0))[:NEIGHBOURS]
-        around = np.where(self.present[:, nearest, None], self.position[:, nearest], np.nan)
-        distance = np.linalg.norm(around[:, :, None] - around[:, None], axis=3).reshape(len(place), -1)
-        found = [0]
-        for k in range(1, len(place)):
-            change = np.abs(distance[k] - distance[found[-1]])
-            if np.max(change, initial=0.0, where=np.isfinite(change)) > least:
-                found.append(k)
-        return np.array(found, np.intp)
-
     def find_places(self, k: int, size: float, apart: float, deep: float, near: Array | None) -> Array:
         """Find places (p, 2) in photograph k where a rod touches at least three bodies and overlaps none.
 
