@@ -187,9 +187,12 @@ def test_contacts_count_where_the_bodies_that_touch_rearrange() -> None:
     assert box(position).count_rearranged(np.zeros((6, 2)), 8e-3, 1e-4, 1e-4) == 4
     assert box(position).count_rearranged(np.zeros((6, 2)), 8e-3, 1e-4, 5e-4) == 2
     assert box(position).count_rearranged(np.zeros((6, 2)), 7e-3, 1e-4, 1e-4) == 0  # nothing touches
-    lost = box(position)
-    lost.present[2:, 0] = False  # the others do not rearrange
-    assert lost.count_rearranged(np.zeros((6, 2)), 8e-3, 1e-4, 1e-4) == 1
+    angle = np.radians([0.0, 90.0, 180.0, 270.0])
+    position = np.tile(0.018 * np.stack([np.cos(angle), np.sin(angle)], axis=1), (2, 1, 1))
+    position[0, 0] = 0.05
+    late = box(position)
+    late.present[0, 0] = False  # how far it moved is not known
+    assert late.count_rearranged(np.zeros((2, 2)), 8e-3, 1e-4, 1e-4) == 1
 
 
 def test_a_wall_is_around_a_place_although_it_is_far_from_the_grains_there() -> None:
