@@ -18,6 +18,7 @@ from scipy.sparse.csgraph import connected_components
 from ..bodies.grains import Array
 from ..bodies.motion import FrameMotion, Snapshot
 from ..bodies.packing import Packing
+from ..bodies.wall_shapes import behind_body
 from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts
 from ..contacts.kinematics import relative_motion
@@ -200,6 +201,7 @@ def _count_beyond(walls: Walls, snapshot: Snapshot, contacts: Contacts) -> int:
     beyond = (beside & (out > 0.0)).any(axis=1) & snapshot.present
     if not beyond.any():
         return 0
+    beyond &= (beside & (out > 0.0) & ~behind_body(walls.endpoints, walls.side, snapshot.position)).any(axis=1)
     n, pair = len(beyond), ~contacts.with_wall
     pairs = csr_array((np.ones(int(pair.sum())), (contacts.i[pair], contacts.j[pair])), shape=(n, n))
     part = connected_components(pairs, directed=False)[1]

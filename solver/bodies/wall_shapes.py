@@ -215,7 +215,8 @@ def bounding_distance(endpoints: Array, side: Sides, point: Array) -> tuple[Arra
 
     A bar ends: what is past its end and beyond its line may be inside the packing, as rods are beside a footing, in
     the other half of a box that is split, or in a pit between two floors. It is outside only if it is not in front of
-    the wall that is nearest, and beyond another wall, too, or farther beyond than the bar is long.
+    the wall that is nearest, and beyond another wall, too, or farther beyond than the bar is long. Nor does one face of
+    a body in the packing, as of a pile, bound what is in front of its opposite face.
 
     Parameters
     ----------
@@ -242,7 +243,36 @@ def bounding_distance(endpoints: Array, side: Sides, point: Array) -> tuple[Arra
     alone = (distance < 0.0).sum(axis=-1, keepdims=True) == 1
     length = np.linalg.norm(endpoints[..., 1, :] - endpoints[..., 0, :], axis=-1)
     inside = in_front | (alone & (distance > -length))
-    return np.where(past & inside & (distance < 0.0), np.inf, distance), normal
+    free = past & inside & (distance < 0.0)
+    return np.where(free | behind_body(endpoints, side, point), np.inf, distance), normal
+
+
+def behind_body(endpoints: Array, side: Sides, point: Array) -> NDArray[np.bool_]:
+    """Return whether points are beyond walls, but in front of the opposite face of the same body.
+
+    Parameters
+    ----------
+    endpoints : (…, w, 2, 2)
+        Walls [m].
+    side : (w,)
+        Shapes of the walls.
+    point : (…, 2)
+        Points [m].
+
+    Returns
+    -------
+    (…, w)
+        False for circles.
+    """
+    place = point[..., None, :]
+    distance, normal = wall_distance(endpoints, side, place)
+    if not (distance < 0.0).any():
+        return np.zeros(distance.shape, np.bool_)
+    beside = beside_wall(endpoints, side, place, np.zeros(distance.shape))
+    beside &= np.ones(1, np.bool_) if side is None else side == STRAIGHT
+    opposite = np.einsum("...wk,...vk->...wv", normal, normal) < -ALIKE
+    between = (distance >= 0.0)[..., None, :] & (distance[..., None, :] < -distance[..., :, None])
+    return (opposite & between & beside[..., None, :]).any(axis=-1) & beside
 
 
 def wall_displacement(former: Array, later: Array, side: Sides, at: Array | None = None) -> Array:

@@ -13,7 +13,7 @@ from ...solver.bodies.grains import Array, Grains
 from ...solver.bodies.outer_grains import find_outer_grains
 from ...solver.bodies.rods import RodMaterial
 from ...solver.bodies.strain import displacement_gradient, inertial_time, shear_strain
-from ...solver.bodies.wall_shapes import STRAIGHT, outward_normals
+from ...solver.bodies.wall_shapes import STRAIGHT, behind_body, outward_normals
 from ...solver.bodies.walls import Walls
 from ...solver.contacts.contacts import detect_contacts
 from ...tracks import Tracks, WallTracks
@@ -280,7 +280,9 @@ def _known_gaps(tracks: Tracks, walls: WallTracks, w: int, order: int) -> Iterat
 
 def _near_gap(tracks: Tracks, walls: WallTracks, k: int, w: int, *, nearest: int = NEAREST) -> float:
     """Gap [m] between a wall and one of the nearest rods beside it."""
-    _, gap = rods_beside(tracks, k, walls.endpoints[k, w])
+    rows, gap = rods_beside(tracks, k, walls.endpoints[k, w])
+    if not np.isnan(walls.endpoints[k]).any():
+        gap = gap[~behind_body(walls.endpoints[k], walls.sides, tracks.position[k, rows])[:, w]]
     return float(np.sort(gap)[nearest - 1]) if len(gap) >= nearest else np.nan
 
 

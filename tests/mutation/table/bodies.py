@@ -51,6 +51,9 @@ MUTANTS = [
         ("(alone & (distance > -length))", "alone"),
         ("np.where(past, from_ends, np.abs(distance)).argmin", "np.abs(distance).argmin"),
         ("(~past & (distance >= 0.0), nearest", "(~past, nearest"),
+        ("(distance[..., None, :] < -distance[..., :, None])", "True"),
+        ("& beside[..., None, :]).any(axis=-1) & beside", ").any(axis=-1) & beside"),
+        ("normal, normal) < -ALIKE", "normal, normal) < ALIKE"),
     ),
     *mutants_of(
         "solver/inferred/surroundings.py",

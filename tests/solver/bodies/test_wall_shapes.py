@@ -10,6 +10,7 @@ from rodsight.solver.bodies.wall_shapes import (
     IN,
     OUT,
     STRAIGHT,
+    behind_body,
     beside_wall,
     bounding_distance,
     circle_ends,
@@ -262,6 +263,25 @@ def test_a_grain_past_the_end_of_one_wall_is_not_beyond_it() -> None:
     assert normal.shape == (4, 3, 2)
     far = bounding_distance(corner[:1], None, np.array([[0.35, 0.15], [0.25, 0.15]]))[0]
     assert far[:, 0] == pytest.approx([-0.15, np.inf])  # the first is farther away than the wall is long
+
+
+def test_a_face_of_a_body_does_not_bound_what_is_in_front_of_its_opposite_face() -> None:
+    box = np.array([[0.0, 0.0], [0.3, 0.0], [0.3, 0.2], [0.0, 0.2]])
+    pile = np.array([[[0.14, 0.1], [0.14, 0.2]], [[0.16, 0.2], [0.16, 0.1]], [[0.16, 0.1], [0.14, 0.1]]])
+    walls = np.concatenate([np.stack([box, np.roll(box, -1, axis=0)], axis=1), pile])
+    place = np.array([[0.25, 0.15], [0.05, 0.15], [0.25, 0.05], [0.145, 0.15], [0.305, 0.15], [0.15, 0.15]])
+    behind = behind_body(walls, None, place)
+    assert behind[:, 4].tolist() == [True, False, False, False, True, False]
+    assert behind[:, 5].tolist() == [False, True, False, False, False, False]
+    assert not behind[:, [0, 1, 2, 3, 6]].any()
+    longer = np.array([[[0.14, 0.05], [0.14, 0.2]], pile[1]])
+    assert not behind_body(longer, None, np.array([0.25, 0.07])).any()  # not in front of the shorter face
+    overhanging = np.array([[[0.0, 0.0], [0.4, 0.0]], [[0.3, 0.0], [0.3, 0.2]]])
+    assert not behind_body(overhanging, None, np.array([0.31, 0.005])).any()  # in front of the floor
+    distance, _ = bounding_distance(walls, None, place)
+    assert (distance[:3] > 0.0).all()
+    assert distance[3, 4] == pytest.approx(-0.005)  # inside the pile
+    assert distance[4, 1] == pytest.approx(-0.005)  # outside of the box
 
 
 def test_floors_of_different_heights_bound_what_is_in_front_of_them() -> None:
