@@ -30,7 +30,7 @@ MOST_PENALTIES = 3  # reasons of the lowest trust that are listed
 
 def print_summary(console: Console, summary: dict[str, Any]) -> None:
     """Print the frames as a table, and the accuracy below it."""
-    console.print(_frame_table(summary))
+    console.print(frame_table(summary))
     if summary.get("out_of_date"):
         console.print(f"[bold red]Out of date:[/] {escape('; '.join(summary['out_of_date']))}.", highlight=False)
     for line in trust_lines(summary):
@@ -276,11 +276,13 @@ def calibration_lines(facts: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _frame_table(summary: dict[str, Any]) -> Table:
+def frame_table(summary: dict[str, Any]) -> Table:
+    """Table of the frames, thinned to MAX_ROWS; a mean force of arbitrary scale has no unit."""
     table = Table(title=summary["name"], box=None, header_style="bold", pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("frame", justify="right")
     table.add_column("status")
-    for heading in ("contacts", "z", "φ/°", "⟨f_n⟩/N", "nat. map", "ε", "trust"):
+    mean = "⟨f_n⟩/N" if summary.get("force_unit", "N") == "N" else "⟨f_n⟩"
+    for heading in ("contacts", "z", "φ/°", mean, "nat. map", "ε", "trust"):
         table.add_column(heading, justify="right", no_wrap=True)
     truth = summary.get("accuracy")
     if truth:

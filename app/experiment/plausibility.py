@@ -141,6 +141,16 @@ def implausible_density(density: float) -> list[str]:
     ]
 
 
+def _touched_fraction(tracks: Tracks, walls: WallTracks, w: int) -> float:
+    """Fraction of the length of wall w beside which grains of the first photograph are, as of a high wall of a bed."""
+    bar = walls.endpoints[0, w, 1] - walls.endpoints[0, w, 0]
+    length = float(np.hypot(*bar))
+    if walls.sides[w] != STRAIGHT or not length > 0.0:
+        return 1.0
+    along = tracks.position[0, tracks.present[0]] @ (bar / length)
+    return min(float(np.ptp(along) + 2.0 * tracks.radius.mean()) / length, 1.0)
+
+
 def implausible_loads(material: MaterialSection, tracks: Tracks, walls: WallTracks) -> list[str]:
     """Return a warning for every pressure or load that is possible but implausible: very small, or above STRENGTH.
 
@@ -153,7 +163,8 @@ def implausible_loads(material: MaterialSection, tracks: Tracks, walls: WallTrac
         return []
     weight = material.density * 9.81 * float(np.sum(np.pi * tracks.radius[here] ** 2)) / width  # [Pa], per length
     usual = walls.usual_pressure(material.length)
-    for name, pressure in [(walls.name[w], usual[w]) for w in np.flatnonzero(walls.loaded & np.isnan(walls.pressure))]:
+    for w in np.flatnonzero(walls.loaded & np.isnan(walls.pressure)).tolist():
+        name, pressure = walls.name[w], float(usual[w]) / _touched_fraction(tracks, walls, w)
         if pressure < 0.1 * weight or pressure > STRENGTH:
             kind = "little beside the pressure of the rods' own weight" if pressure < weight else "more than rods carry"
             sentences.append(f"the load on wall {name!r} makes {pressure:.3g} Pa on average, {kind}: is it in newtons?")

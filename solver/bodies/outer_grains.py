@@ -81,8 +81,7 @@ def find_outer_grains(radius: Array, position: Array, present: NDArray[np.bool_]
     inner_start = np.unique(mesh.find_simplex(middle[hole]))
     outer = np.zeros(len(rows), np.bool_)
     reached = np.zeros(len(corner), np.bool_)
-    reached[inner_start] = True
-    queue = [(int(t), True) for t in inner_start]
+    queue: list[tuple[int, bool]] = []
     place, outward, in_hole = [], [], []
 
     def cross(a: int, b: int, c: int, hollow: bool) -> bool:
@@ -108,17 +107,21 @@ def find_outer_grains(radius: Array, position: Array, present: NDArray[np.bool_]
         if cross(a, b, c, False) and not reached[t]:
             reached[t] = True
             queue.append((int(t), False))
-    while queue:
-        t, hollow = queue.pop()
-        for k in range(3):
-            other = int(beside[t, k])
-            a, b = corner[t, (k + 1) % 3], corner[t, (k + 2) % 3]
-            if other < 0 or reached[other]:
-                continue
-            c = corner[other][np.flatnonzero(beside[other] == t)[0]]
-            if cross(a, b, c, hollow):
-                reached[other] = True
-                queue.append((other, hollow))
+    for start in (None, *inner_start):  # first from outside: what it reaches, as a crater in a surface, is no hole
+        if start is not None and not reached[start]:
+            reached[start] = True
+            queue.append((int(start), True))
+        while queue:
+            t, hollow = queue.pop()
+            for k in range(3):
+                other = int(beside[t, k])
+                a, b = corner[t, (k + 1) % 3], corner[t, (k + 2) % 3]
+                if other < 0 or reached[other]:
+                    continue
+                c = corner[other][np.flatnonzero(beside[other] == t)[0]]
+                if cross(a, b, c, hollow):
+                    reached[other] = True
+                    queue.append((other, hollow))
     outer[np.unique(corner[reached])] = True
     marked = np.zeros(len(radius), np.bool_)
     marked[rows] = outer

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rodsight.experiment.config.tuning_sections import MaterialSection
 from rodsight.experiment.plausibility import (
     PackingSources,
     check_inside,
     expected_rods,
+    implausible_loads,
     neighbour_spacing,
     open_sides,
     rods_beyond_ends,
@@ -46,6 +49,13 @@ def test_rods_beyond_the_end_of_a_wall_are_reported(missing, expected):
     found = rods_beyond_ends(row_of_rods(6), floor(2.0 * RADIUS * (6 - missing)))
     assert [sentence[:6] for sentence in found] == expected
     assert all("'floor'" in sentence for sentence in found)
+
+
+@pytest.mark.parametrize(("load", "warnings"), [(0.6, 0), (0.06, 1)])
+def test_a_load_is_judged_by_the_part_of_the_wall_that_rods_touch(load, warnings):
+    """The weight of the rods makes 420 Pa on the tenth of the wall beside which they are."""
+    walls = replace(floor(1.2), load=np.array([[load]]))
+    assert len(implausible_loads(MaterialSection(), row_of_rods(6), walls)) == warnings
 
 
 def test_touching_neighbours_have_a_spacing_of_one():

@@ -23,8 +23,8 @@ def test_empty_texts_are_no_reasons_and_texts_of_several_stay_several() -> None:
 
 def test_no_penalty_contains_the_separator() -> None:
     wrong = replace(
-        ASSESSED, correction=1.0, disagreement=0.9, agreement=0.3, old_unbalance=0.5, power_gap=1.0, unbalance=0.4,
-        shear=math.radians(2.0), load_fraction=0.3, corrected_gap=1e-4, inertial_number=0.05,
+        ASSESSED, correction=0.3, disagreement=0.5, agreement=0.5, old_unbalance=0.2, power_gap=0.4, unbalance=0.1,
+        shear=math.radians(0.5), load_fraction=0.6, corrected_gap=1e-4,
     )  # fmt: skip
     words = [each.words for each in find_penalties(wrong)]
     assert len(words) >= 4

@@ -48,6 +48,17 @@ def test_surfaces_of_holes_are_marked_and_point_inwards() -> None:
     assert np.all(away[~found.inner] > 0.0)
 
 
+def test_a_crater_is_a_surface_and_no_hole() -> None:
+    x, y = np.meshgrid(np.arange(11), np.arange(7))
+    place = R + 2.0 * R * np.stack([x.ravel(), y.ravel()], axis=1)
+    place += np.random.default_rng(2).uniform(0, 1e-5, place.shape)
+    dug = place[np.hypot(place[:, 0] - 11 * R, place[:, 1] - 15 * R) > 9 * R]
+    corner = np.array([[0.0, 0.6], [0.0, 0.0], [22 * R, 0.0], [22 * R, 0.6]])
+    found = outer_of(dug, Walls.at_rest(np.stack([corner[:-1], corner[1:]], axis=1)))
+    assert not found.inner.any()
+    assert [side.name for side in found.sides(~found.inner)] == ["at the top"]
+
+
 @pytest.mark.thorough
 def test_grains_along_walls_are_not_outer() -> None:
     x, y = np.meshgrid(np.arange(8), np.arange(6))
