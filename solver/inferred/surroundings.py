@@ -190,23 +190,26 @@ class Surroundings:
             return size, 0.0
         return size + float(covariance[2] @ design.T @ gap[touches]), 1.0 / float(covariance[2, 2])
 
-    def count_rearranged(self, position: Array, size: float, apart: float, least: float) -> int:
+    def count_rearranged(self, position: Array, size: float, within: tuple[float, float], least: float) -> int:
         """Count contacts beyond two of a rod in photographs between which the bodies that touch it rearrange.
 
         Parameters
         ----------
         position : array (f, 2)
             Of the rod [m].
-        size, apart : float
-            Radius of the rod, and greatest distance of surfaces that touch [m].
+        size : float
+            Radius of the rod [m].
+        within : (float, float)
+            Greatest overlap and greatest gap of a body that touches [m].
         least : float
             Least change [m] of a distance between two touching bodies since the photograph that was counted last.
         """
         last, total = -1, 0
         for k, place in enumerate(position):
-            apart_now = np.linalg.norm(self.position[k] - place, axis=1) - self.radius - size
-            grains = np.flatnonzero(self.present[k] & (np.abs(apart_now) < apart))
-            walls = np.flatnonzero(np.abs(self._reach(k, place[None])[0][0] - size) < apart)
+            gap = np.linalg.norm(self.position[k] - place, axis=1) - self.radius - size
+            grains = np.flatnonzero(self.present[k] & (gap > -within[0]) & (gap < within[1]))
+            gap = self._reach(k, place[None])[0][0] - size
+            walls = np.flatnonzero((gap > -within[0]) & (gap < within[1]))
             further = len(grains) + len(walls) - 2
             if further <= 0:
                 continue

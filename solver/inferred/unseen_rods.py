@@ -27,8 +27,9 @@ TOUCHES_FREE = 2  # bodies that any rod can touch by its choice of place
 LEAST_HELD = 0.45  # mean number of further contacts per photograph that is significant …
 LEAST_TOUCHES = 5.0  # … and their least number in all photographs together
 # A chance contact in a packing at rest is the same contact in all photographs. Where fewer are found in those between
-# which the grains around rearrange (of 49 rods left out, two kinds, seeds 20, 42, 61 to 63: one), …
+# which the bodies that touch rearrange, …
 LEAST_REARRANGED = 4
+ALWAYS_HELD, LEAST_REARRANGED_HELD = 1.0, 3  # … or where a further one is there on average, …
 FIRMLY_HELD = 1.5  # … the mean number must be that of several contacts at once
 # Standard deviations of a gap that the bodies which touch a rod leave: of 61 rods left out of eight packings (seeds 20,
 # 22, 42, 43) 60 leave less; a natural pore that moves with its neighbours leaves 2.6 to 4.6.
@@ -201,7 +202,8 @@ def _propose_of_any_size(
                 continue
             contacts = rod.contacts.copy()
             contacts[k] = max(contacts[k] - 1.0, 0.0)
-            anew = around.count_rearranged(rod.position, rod.radius, tolerance.apart, MOVED_APART * tolerance.exact)
+            within = (tolerance.deep, tolerance.apart)
+            anew = around.count_rearranged(rod.position, rod.radius, within, MOVED_APART * tolerance.exact)
             exact = _fit_size(around, rod, tolerance)[1] <= SIZE_MISFIT * np.sqrt(2.0) * around.noise
             proposed.append(replace(rod, contacts=contacts, demanded=exact and anew >= LEAST_REARRANGED))
     return proposed
@@ -251,12 +253,18 @@ def _is_held_anew(around: Surroundings, rod: _Rod, tolerance: _Tolerance) -> boo
     """Return whether a rod has enough contacts in the photographs between which the bodies around it rearrange."""
     if rod.demanded is not None:
         return rod.demanded
-    anew = around.count_rearranged(rod.position, rod.radius, tolerance.apart, tolerance.exact)
-    return anew >= LEAST_REARRANGED
+    within = (tolerance.deep, tolerance.apart)
+    anew = around.count_rearranged(rod.position, rod.radius, within, tolerance.exact)
+    return anew >= (LEAST_REARRANGED_HELD if rod.held >= ALWAYS_HELD else LEAST_REARRANGED)
 
 
 def _gap_misfit(around: Surroundings, rod: _Rod, tolerance: _Tolerance) -> float:
-    """Root mean square [m] of the gaps to bodies that touch a rod, beyond the two that any place can touch."""
+    """Root mean square [m] of the gaps to bodies that touch a rod, beyond the two that any place can touch.
+
+    0 of soft grains: the gaps of rods that bear forces are overlaps of all sizes.
+    """
+    if tolerance.deep > tolerance.exact:
+        return 0.0
     square: list[float] = []
     for k, place in enumerate(rod.position):
         gap = gaps(around.bodies(place, k, rod.radius), place, rod.radius)

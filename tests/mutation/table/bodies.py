@@ -73,7 +73,7 @@ MUTANTS = [
         ("demanded=exact and anew >= LEAST_REARRANGED", "demanded=anew >= LEAST_REARRANGED"),
         ("demanded=exact and anew >= LEAST_REARRANGED", "demanded=exact"),
         ("<= GAP_MISFIT * np.sqrt(2.0) * around.noise", "<= np.inf"),
-        ("return anew >= LEAST_REARRANGED", "return True"),
+        ("anew >= (LEAST_REARRANGED_HELD if rod.held", "anew >= (0 if rod.held"),
     ),
     *mutants_of(
         "solver/bodies/packing.py",

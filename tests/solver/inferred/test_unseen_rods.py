@@ -184,15 +184,15 @@ def test_contacts_count_where_the_bodies_that_touch_rearrange() -> None:
     position = np.tile(ring_of_three, (6, 1, 1))
     for k, turned in enumerate(np.radians([0.0, 0.0, 2.0, 4.0, 4.0, 2.0])):  # of the first, along the ring
         position[k, 0] = 0.018 * np.array([np.cos(turned), np.sin(turned)])
-    assert box(position).count_rearranged(np.zeros((6, 2)), 8e-3, 1e-4, 1e-4) == 4
-    assert box(position).count_rearranged(np.zeros((6, 2)), 8e-3, 1e-4, 5e-4) == 2
-    assert box(position).count_rearranged(np.zeros((6, 2)), 7e-3, 1e-4, 1e-4) == 0  # nothing touches
+    assert box(position).count_rearranged(np.zeros((6, 2)), 8e-3, (1e-4, 1e-4), 1e-4) == 4
+    assert box(position).count_rearranged(np.zeros((6, 2)), 8e-3, (1e-4, 1e-4), 5e-4) == 2
+    assert box(position).count_rearranged(np.zeros((6, 2)), 7e-3, (1e-4, 1e-4), 1e-4) == 0  # nothing touches
     angle = np.radians([0.0, 90.0, 180.0, 270.0])
     position = np.tile(0.018 * np.stack([np.cos(angle), np.sin(angle)], axis=1), (2, 1, 1))
     position[0, 0] = 0.05
     late = box(position)
     late.present[0, 0] = False  # how far it moved is not known
-    assert late.count_rearranged(np.zeros((2, 2)), 8e-3, 1e-4, 1e-4) == 1
+    assert late.count_rearranged(np.zeros((2, 2)), 8e-3, (1e-4, 1e-4), 1e-4) == 1
 
 
 def test_a_wall_is_around_a_place_although_it_is_far_from_the_grains_there() -> None:
