@@ -258,10 +258,10 @@ def _mix(
 
 def mean_stress(problem: FrameProblem, estimate: Estimate) -> float:
     """Half the trace of the stress of the motion estimate [Pa] under the load, comparable from frame to frame."""
-    fn, ft = (estimate.fn, estimate.ft) if estimate.motion is None else (estimate.motion.fn, estimate.motion.ft)
-    position, walls = problem.snapshot.position, estimate.step.walls
-    area = packing_area(walls, position[problem.snapshot.present])
-    stress = love_weber_stress(estimate.contacts, fn, ft, position, area, problem.packing.length)
+    field = estimate if estimate.motion is None else estimate.motion
+    snapshot, walls = problem.snapshot, estimate.step.walls
+    size = packing_area(walls, snapshot.position[snapshot.present]), problem.packing.length
+    stress = love_weber_stress(estimate.contacts, field.fn, field.ft, snapshot.position, *size)
     return 0.5 * float(np.trace(stress)) * load_scale(problem, estimate)
 
 
@@ -273,8 +273,7 @@ def load_scale(problem: FrameProblem, estimate: Estimate) -> float:
 def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceState) -> Evidence:
     """Gather the evidence of the reported field; ε and ū are those of the recorded chain."""
     packing, snapshot, step = problem.packing, problem.snapshot, estimate.step
-    pressure = mean_stress(problem, estimate)
-    load = packing.mean_pressure(snapshot)
+    pressure, load = mean_stress(problem, estimate), packing.mean_pressure(snapshot)
     # A return from a faulty frame is no jump, nor is a change of the measured loads.
     load_ratio = packing.load_ratio(snapshot, problem.sequence.snapshots[max(problem.k - 1, 0)])
     former = [load_ratio * p for p in (state.pressure, state.sound_pressure) if p > 0 and not problem.scale_is_open]
@@ -324,11 +323,10 @@ def _motion_information(problem: FrameProblem, estimate: Estimate) -> MotionInfo
 
 def _inertial_number(problem: FrameProblem, load: float) -> float:
     """Inertial number by the mean pressure of the loads [Pa]; NaN without one."""
-    packing, motion = problem.packing, problem.motion
+    motion, mass = problem.motion, float(problem.packing.grains.mass[problem.snapshot.present].mean())
     if not (load > 0.0 and motion.interval > 0.0 and motion.ends_here):
         return np.nan
-    mass = float(packing.grains.mass[problem.snapshot.present].mean())
-    return shear_over(motion) / motion.interval * inertial_time(mass, load, packing.length)
+    return shear_over(motion) / motion.interval * inertial_time(mass, load, problem.packing.length)
 
 
 def _count_interior(problem: FrameProblem, estimate: Estimate) -> int:
