@@ -198,10 +198,10 @@ def _count_beyond(walls: Walls, snapshot: Snapshot, contacts: Contacts) -> int:
     out = np.einsum("nwk,wk->nw", offset, walls.outward)
     along = np.einsum("nwk,wk->nw", offset, walls.direction)
     beside: NDArray[np.bool_] = (along > 0.0) & (along < walls.length[None, :])
-    beyond = (beside & (out > 0.0)).any(axis=1) & snapshot.present
-    if not beyond.any():
+    past = beside & (out > 0.0) & snapshot.present[:, None]
+    if not past.any():
         return 0
-    beyond &= (beside & (out > 0.0) & ~behind_body(walls.endpoints, walls.side, snapshot.position)).any(axis=1)
+    beyond = (past & ~behind_body(walls.endpoints, walls.side, snapshot.position)).any(axis=1)
     n, pair = len(beyond), ~contacts.with_wall
     pairs = csr_array((np.ones(int(pair.sum())), (contacts.i[pair], contacts.j[pair])), shape=(n, n))
     part = connected_components(pairs, directed=False)[1]

@@ -244,7 +244,7 @@ def bounding_distance(endpoints: Array, side: Sides, point: Array) -> tuple[Arra
     length = np.linalg.norm(endpoints[..., 1, :] - endpoints[..., 0, :], axis=-1)
     inside = in_front | (alone & (distance > -length))
     free = past & inside & (distance < 0.0)
-    return np.where(free | behind_body(endpoints, side, point), np.inf, distance), normal
+    return np.where(free | _in_front_of_opposite(distance, normal, ~past & _straight(side)), np.inf, distance), normal
 
 
 def behind_body(endpoints: Array, side: Sides, point: Array) -> NDArray[np.bool_]:
@@ -266,10 +266,19 @@ def behind_body(endpoints: Array, side: Sides, point: Array) -> NDArray[np.bool_
     """
     place = point[..., None, :]
     distance, normal = wall_distance(endpoints, side, place)
+    beside = beside_wall(endpoints, side, place, np.zeros(distance.shape)) & _straight(side)
+    return _in_front_of_opposite(distance, normal, beside)
+
+
+def _straight(side: Sides) -> NDArray[np.bool_]:
+    """Which walls are straight, broadcast as the walls."""
+    return np.ones(1, np.bool_) if side is None else side == STRAIGHT
+
+
+def _in_front_of_opposite(distance: Array, normal: Array, beside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """As `behind_body`, by distances (…, w) and outward normals, of straight walls that points project onto."""
     if not (distance < 0.0).any():
         return np.zeros(distance.shape, np.bool_)
-    beside = beside_wall(endpoints, side, place, np.zeros(distance.shape))
-    beside &= np.ones(1, np.bool_) if side is None else side == STRAIGHT
     opposite = np.einsum("...wk,...vk->...wv", normal, normal) < -ALIKE
     between = (distance >= 0.0)[..., None, :] & (distance[..., None, :] < -distance[..., :, None])
     return (opposite & between & beside[..., None, :]).any(axis=-1) & beside

@@ -258,10 +258,9 @@ def _mix(
 
 def mean_stress(problem: FrameProblem, estimate: Estimate) -> float:
     """Half the trace of the stress of the motion estimate [Pa] under the load, comparable from frame to frame."""
-    field = estimate if estimate.motion is None else estimate.motion
-    snapshot, walls = problem.snapshot, estimate.step.walls
-    size = packing_area(walls, snapshot.position[snapshot.present]), problem.packing.length
-    stress = love_weber_stress(estimate.contacts, field.fn, field.ft, snapshot.position, *size)
+    field, place = estimate if estimate.motion is None else estimate.motion, problem.snapshot.position
+    area = packing_area(estimate.step.walls, place[problem.snapshot.present])
+    stress = love_weber_stress(estimate.contacts, field.fn, field.ft, place, area, problem.packing.length)
     return 0.5 * float(np.trace(stress)) * load_scale(problem, estimate)
 
 
@@ -323,10 +322,11 @@ def _motion_information(problem: FrameProblem, estimate: Estimate) -> MotionInfo
 
 def _inertial_number(problem: FrameProblem, load: float) -> float:
     """Inertial number by the mean pressure of the loads [Pa]; NaN without one."""
-    motion, mass = problem.motion, float(problem.packing.grains.mass[problem.snapshot.present].mean())
+    motion, packing = problem.motion, problem.packing
     if not (load > 0.0 and motion.interval > 0.0 and motion.ends_here):
         return np.nan
-    return shear_over(motion) / motion.interval * inertial_time(mass, load, problem.packing.length)
+    time = inertial_time(float(packing.grains.mass[problem.snapshot.present].mean()), load, packing.length)
+    return shear_over(motion) / motion.interval * time
 
 
 def _count_interior(problem: FrameProblem, estimate: Estimate) -> int:

@@ -246,7 +246,7 @@ MUTANTS = [
         ("_sliding_over_noise(slid[held], slide_sd[held])", "np.inf"),
         ("max(variance - expected, 0.0)", "variance"),
         ("after - motion.interval * moving.velocity", "after - moving.velocity"),
-        ("(beside & (out > 0.0)).any(axis=1)", "(out > 0.0).any(axis=1)"),
+        ("past = beside & (out > 0.0) &", "past = (out > 0.0) &"),
         ("strong = fn > STRONG * mean_normal_force(fn)", "strong = fn > 0.0"),
     ),
     *mutants_of(
