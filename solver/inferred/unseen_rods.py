@@ -85,7 +85,7 @@ class _Rod:
     sigma: Array  # (f,)
     contacts: Array  # (f,) beyond two
     overlapping: float  # fraction of photographs
-    demanded: bool | None = None  # by bodies that rearrange around it; None: not judged yet
+    of_known_size: bool = True
 
     @property
     def held(self) -> float:
@@ -127,13 +127,13 @@ def infer_unseen(
     position, present, endpoints = position[shown], present[shown], endpoints[shown]
     frames = len(position)
     rods: list[_Rod] = []
-    limits = float(np.min(radius if sizes is None else sizes)), float(np.max(radius if sizes is None else sizes))
     exact = MISFIT * np.sqrt(2.0) * noise + SURFACE * float(radius.mean())
     tolerance = _Tolerance(exact + OVERLAPS * overlap, exact + DEEPEST * overlap, exact)
     # Soft rods are reduced by half the mean overlap, so that their gaps vary about zero.
     radius, noise = radius - 0.5 * overlap, float(np.hypot(noise, overlap / np.sqrt(2.0)))
-    limits = limits[0] - 0.5 * overlap, limits[1] - 0.5 * overlap
     known = None if sizes is None else sizes - 0.5 * overlap
+    possible = radius if known is None else known
+    limits = float(possible.min()), float(possible.max())
     if frames >= FEWEST_FRAMES and endpoints.shape[1] and tolerance.apart < COARSE * limits[0]:
         near: Array | None = None
         for _ in range(PASSES):
@@ -202,10 +202,7 @@ def _propose_of_any_size(
                 continue
             contacts = rod.contacts.copy()
             contacts[k] = max(contacts[k] - 1.0, 0.0)
-            within = (tolerance.deep, tolerance.apart)
-            anew = around.count_rearranged(rod.position, rod.radius, within, MOVED_APART * tolerance.exact)
-            exact = _fit_size(around, rod, tolerance)[1] <= SIZE_MISFIT * np.sqrt(2.0) * around.noise
-            proposed.append(replace(rod, contacts=contacts, demanded=exact and anew >= LEAST_REARRANGED))
+            proposed.append(replace(rod, contacts=contacts, of_known_size=False))
     return proposed
 
 
@@ -251,11 +248,13 @@ def _track(around: Surroundings, place: Array, k: int, size: float, tolerance: _
 
 def _is_held_anew(around: Surroundings, rod: _Rod, tolerance: _Tolerance) -> bool:
     """Return whether a rod has enough contacts in the photographs between which the bodies around it rearrange."""
-    if rod.demanded is not None:
-        return rod.demanded
     within = (tolerance.deep, tolerance.apart)
-    anew = around.count_rearranged(rod.position, rod.radius, within, tolerance.exact)
-    return anew >= (LEAST_REARRANGED_HELD if rod.held >= ALWAYS_HELD else LEAST_REARRANGED)
+    least = tolerance.exact if rod.of_known_size else MOVED_APART * tolerance.exact
+    anew = around.count_rearranged(rod.position, rod.radius, within, least)
+    if rod.of_known_size:
+        return anew >= (LEAST_REARRANGED_HELD if rod.held >= ALWAYS_HELD else LEAST_REARRANGED)
+    misfit = _fit_size(around, rod, tolerance)[1]
+    return anew >= LEAST_REARRANGED and misfit <= SIZE_MISFIT * np.sqrt(2.0) * around.noise
 
 
 def _gap_misfit(around: Surroundings, rod: _Rod, tolerance: _Tolerance) -> float:

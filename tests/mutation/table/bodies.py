@@ -70,8 +70,11 @@ MUTANTS = [
     *mutants_of(
         "solver/inferred/unseen_rods.py",
         "tests/solver/inferred/test_unseen_rods.py",
-        ("demanded=exact and anew >= LEAST_REARRANGED", "demanded=anew >= LEAST_REARRANGED"),
-        ("demanded=exact and anew >= LEAST_REARRANGED", "demanded=exact"),
+        ("anew >= LEAST_REARRANGED and misfit <= SIZE_MISFIT", "misfit <= SIZE_MISFIT"),
+        (
+            "anew >= LEAST_REARRANGED and misfit <= SIZE_MISFIT * np.sqrt(2.0) * around.noise",
+            "anew >= LEAST_REARRANGED",
+        ),
         ("<= GAP_MISFIT * np.sqrt(2.0) * around.noise", "<= np.inf"),
         ("anew >= (LEAST_REARRANGED_HELD if rod.held", "anew >= (0 if rod.held"),
     ),
