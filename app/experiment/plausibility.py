@@ -262,8 +262,9 @@ def rods_beyond_ends(tracks: Tracks, walls: WallTracks) -> list[str]:
     """
     nothing = np.zeros(tracks.position.shape[:2])
     sequence = MeasuredSequence(
-        tracks.radius, tracks.position, nothing, tracks.present, walls.endpoints, nothing, walls.side
-    )
+        tracks.radius, tracks.position, nothing, tracks.present, walls.endpoints, nothing, walls.side,
+        boundary=tracks.boundary,
+    )  # fmt: skip
     sentences = []
     for w, rods in enumerate(bearing_past_ends(sequence).sum(axis=0).tolist()):
         if rods:

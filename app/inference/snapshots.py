@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from ..solver.bodies.grains import Array
+from ..solver.bodies.grains import Array, Grains
 from ..solver.bodies.interpolation import interpolate_ignored_frames
 from ..solver.bodies.motion import Snapshot
 from ..solver.bodies.packing import Packing
@@ -35,6 +35,11 @@ def make_snapshots(tracks: Tracks, walls: WallTracks) -> list[Snapshot]:
     ]  # fmt: skip
 
 
+def grains_of(tracks: Tracks) -> Grains:
+    """The grains of tracks with their boundary, for questions of geometry: their masses are those of a unit density."""
+    return Grains.of_rods(tracks.radius, density=1.0, length=1.0, boundary=tracks.boundary)
+
+
 def pack_seen(
     material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]
 ) -> tuple[Packing, list[Snapshot]]:
@@ -51,7 +56,7 @@ def measure_sequence(tracks: Tracks, walls: WallTracks) -> MeasuredSequence:
     sigma[~tracks.present] = 0.0
     return MeasuredSequence(
         tracks.radius, tracks.position, rotation, present, walls.endpoints, sigma, walls.side, walls.cell,
-        _centre_spread(tracks),
+        _centre_spread(tracks), tracks.boundary,
     )  # fmt: skip
 
 

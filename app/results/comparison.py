@@ -15,7 +15,8 @@ from ..solver.bodies.walls import Walls
 from ..solver.contacts.contacts import Contacts, measure_contacts
 from ..solver.contacts.pairs import make_keys
 from ..solver.statistics.agreement import Agreement, compare_forces
-from ..solver.statistics.stress import friction_angle, love_weber_stress, packing_area, sums_on_walls, wall_ratio_angle
+from ..solver.statistics.packing_area import packing_area
+from ..solver.statistics.stress import friction_angle, love_weber_stress, sums_on_walls, wall_ratio_angle
 from .results import Results, TruthContacts
 
 CLOSE = 0.5  # radii: two grains nearer than this are the same one
@@ -194,7 +195,7 @@ def _with_angles(base: Results, frame: int, field: FieldFrame) -> FieldFrame:
     drawable = np.flatnonzero(np.isfinite(field.contacts.normal).all(axis=1))
     contacts, fn, ft = field.contacts.select(drawable), field.fn[drawable], field.ft[drawable]
     walls = _walls_at(base, frame)
-    area = packing_area(walls, position[present])
+    area = packing_area(walls, position, present, base.tracks.boundary)
     stress = love_weber_stress(contacts, fn, ft, position, area, 1.0)  # a ratio: the length of the rods cancels
     ratio = wall_ratio_angle(walls, sums_on_walls(contacts, fn, ft))
     return replace(field, friction_angle=friction_angle(stress), wall_ratio_angle=ratio)

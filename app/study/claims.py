@@ -22,7 +22,8 @@ from ..solver.nlgs.chain import ChainSettings
 from ..solver.sequence.settings import SequenceSettings
 from ..solver.statistics.agreement import pearson
 from ..solver.statistics.force_statistics import plateau_ratio, tail_exponent
-from ..solver.statistics.stress import friction_angle, love_weber_stress, packing_area, principal_stresses
+from ..solver.statistics.packing_area import packing_area
+from ..solver.statistics.stress import friction_angle, love_weber_stress, principal_stresses
 from .truths import agreement_of, observe, packing_of, simulate, true_forces, window_starts, with_imposed_walls
 
 WINDOW = 14  # photographs of one sequence

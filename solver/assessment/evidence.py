@@ -45,3 +45,4 @@ class Evidence:
     inertial_number: float = math.nan  # of the step by the times of its photographs; NaN: no load is stated
     corrected_gap: float = 0.0  # [m] rms part of a gap that was corrected as errors of single grains
     loaded: bool = True  # by a known load, or by weight alone: see `Packing.is_loaded`
+    sought: bool = False  # rods that no photograph shows: no hole that is left demands one

@@ -10,11 +10,14 @@ import numpy as np
 from ..frame_forces import FrameStatus
 from .evidence import Evidence
 from .fitted import FITTED
-from .trust import MAX_UNSEEN_FRACTION
+from .trust import MAX_UNSEEN_FRACTION, motion_assessment
 
 SUSPECT_CORRECTION = 0.25  # ε beyond which the forces contradict the motion
 MOSTLY_POSITIONS = 0.6  # weight of the position-only estimate above which ε no longer makes a frame suspect
 SUSPECT_PRESSURE_JUMP = 0.15  # |Δp| / p between frames
+# T from which neither ε nor a jump makes a frame suspect: with all evidence, r is then below .87 in one frame of twenty
+# at most, so that these two are sudden motion and sudden stress, and no contradiction.
+RELIABLE = 0.9
 UNBALANCED = 0.05  # worst |ΣF| of a grain over the mean f_n: below .01 in sound fields, .1 to 10 in faulty ones
 CHAIN_UNBALANCED = 0.15  # the same for a single chain, which gives the motion some weight: up to .07 in sound ones
 # Mean stress over the stress of the loads: (1 + 1/K)/2 to (1 + K)/2 with K = 4, beyond what granular matter withstands.
@@ -57,7 +60,7 @@ def decide_status(evidence: Evidence) -> StatusDecision:
         return StatusDecision(
             status, "no motion leads to the first frame: its forces are a guess, and their trust is not assessed"
         )
-    if evidence.holes:
+    if evidence.holes and not evidence.sought:
         places = "1 hole" if evidence.holes == 1 else f"{evidence.holes} holes"
         why += f"; {places} would fit a rod: grains may be unseen"
     return StatusDecision(status, why)
@@ -129,6 +132,8 @@ def find_faults(evidence: Evidence) -> list[str]:
             f"pathological: the mean stress is {evidence.load_fraction:.2f} of the load, which allows "
             f"{LOAD_FRACTIONS[0]} to {LOAD_FRACTIONS[1]}: force chains are missing or jammed"
         )
+    if motion_assessment(evidence).trust >= RELIABLE:
+        return faults
     if evidence.correction > SUSPECT_CORRECTION and evidence.position_weight < MOSTLY_POSITIONS:
         faults.append(
             f"the forces must correct the measured motion by ε = {evidence.correction:.2f} (> {SUSPECT_CORRECTION}): "

@@ -185,8 +185,9 @@ class _Pairs:
 
 
 def find_camera_distortion(
-    position: Array, radius: Array, size_class: NDArray[np.integer], *, soft: bool = False
-) -> CameraDistortion | None:
+    position: Array, radius: Array, size_class: NDArray[np.integer], *, soft: bool = False,
+    boundary: NDArray[np.bool_] | None = None,
+) -> CameraDistortion | None:  # fmt: skip
     """Find the distortion of the camera.
 
     Parameters
@@ -199,6 +200,8 @@ def find_camera_distortion(
         Class of each grain by its size, from 0; the error of a class's radius is found with the distortion.
     soft : bool
         Whether overlaps are forces, so that a small error of the camera matters.
+    boundary : (n,), optional
+        Grains of the boundary, of which two need not touch; None: none.
 
     Returns
     -------
@@ -222,7 +225,7 @@ def find_camera_distortion(
     count = min(max(min(MOST_FRAMES, MOST_POSES // len(radius)), FEWEST_FRAMES), len(position))
     reading = _Reading(
         position[even_subset(len(position), count)],
-        radius, size_class, middle, 0.5 * float(np.ptp(present, axis=0).max()),
+        radius, size_class, middle, 0.5 * float(np.ptp(present, axis=0).max()), boundary,
     )  # fmt: skip
     pairs = reading.find_pairs(None)
     if len(pairs.gap) < FEWEST_PAIRS * pairs.frames:
@@ -256,6 +259,7 @@ class _Reading:
     size_class: NDArray[np.integer]  # (n,)
     middle: Array  # (2,) [m]
     half_width: float  # [m]
+    boundary: NDArray[np.bool_] | None  # (n,)
 
     @property
     def diameter(self) -> float:
@@ -271,12 +275,11 @@ class _Reading:
         gap, design, centre, length = [], [], [], []
         for place in self.position:
             moved = _displacements(place, self.middle, self.half_width)
-            if fit is None or shrinking is None:
-                corrected = place
-            else:
+            corrected = place
+            if fit is not None and shrinking is not None:
                 value = fit.value[:UNKNOWNS]
                 corrected = place + np.tensordot(value, moved, 1) - (shrinking @ value) * (place - self.middle)
-            near = find_near_pairs(corrected, radius)
+            near = find_near_pairs(corrected, radius, self.boundary)
             branch = np.einsum("mk,mk->m", place[near.j] - place[near.i], near.normal)
             along = np.einsum("pck,ck->cp", moved[:, near.j] - moved[:, near.i], near.normal)
             gap.append(branch - self.radius[near.i] - self.radius[near.j])
@@ -303,8 +306,7 @@ def _extend(
         if len(unknowns) == len(chosen):
             continue
         after = _refit(halves[0], unknowns)
-        gain = _likelihood_gain(halves[1], before, after)
-        fit = after[1]
+        gain, fit = _likelihood_gain(halves[1], before, after), after[1]
         certain = not soft and bool((np.abs(fit.value[list(more)]) > CERTAIN * fit.sd[list(more)]).any())
         if gain > GAIN or (gain > 0.0 and certain):
             before, chosen = after, unknowns
@@ -394,5 +396,4 @@ def _place_dependence(pairs: _Pairs, fit: TouchingFit, diameter: float) -> float
     if len(usual) < 2:
         return 0.0
     spread = float(np.ptp(usual))
-    beyond = spread > UNEXPLAINED * fit.scatter and spread > SIGNIFICANT * float(max(error))
-    return spread if beyond else 0.0
+    return spread if spread > max(UNEXPLAINED * fit.scatter, SIGNIFICANT * float(max(error))) else 0.0

@@ -40,7 +40,11 @@ class _Pairs:
 
 
 def find_exchanged_sizes(
-    position: Array, radius: Array, classes: NDArray[np.int64], from_walls: Array | None = None
+    position: Array,
+    radius: Array,
+    classes: NDArray[np.int64],
+    from_walls: Array | None = None,
+    boundary: NDArray[np.bool_] | None = None,
 ) -> Array:
     """Find the radii of grains that are stated to be of another of the stated sizes.
 
@@ -55,6 +59,8 @@ def find_exchanged_sizes(
     from_walls : (f, n, w), optional
         Distances [m] of the centres from walls, NaN beside them. A wall counts if most grains at it touch it: others
         are not where they are stated to be.
+    boundary : (n,), optional
+        Grains of the boundary, of which two need not touch; None: none.
 
     Returns
     -------
@@ -76,6 +82,9 @@ def find_exchanged_sizes(
     reach = float(sizes.max()) + touch
     from_walls = np.empty((*position.shape[:2], 0)) if from_walls is None else from_walls
     pairs = _candidate_pairs(position, from_walls, float(sizes.max()) + reach, reach)
+    if boundary is not None:
+        imposed = np.append(boundary, np.ones(from_walls.shape[2], np.bool_))
+        pairs = pairs.select(~(imposed[pairs.grain] & imposed[pairs.other]))
     pairs, frames = _at_known_walls(pairs, radius, touch), len(position)
     found, of_walls = radius.copy(), np.zeros(from_walls.shape[2])
     for _ in range(ROUNDS):

@@ -33,7 +33,7 @@ class SectionShape(NamedTuple):
 ROUND = SectionShape(0.0, 0.0, 0.0)
 
 
-def measure_section_shape(position: Array, radius: Array) -> SectionShape:
+def measure_section_shape(position: Array, radius: Array, boundary: NDArray[np.bool_] | None = None) -> SectionShape:
     """Estimate how elliptic the sections of rods are.
 
     Parameters
@@ -42,6 +42,8 @@ def measure_section_shape(position: Array, radius: Array) -> SectionShape:
         Centres [m], NaN where a rod is missing.
     radius : (n,)
         Radii [m].
+    boundary : (n,), optional
+        Rods of the boundary, of which two need not touch; None: none.
 
     Returns
     -------
@@ -63,7 +65,7 @@ def measure_section_shape(position: Array, radius: Array) -> SectionShape:
     n = len(radius)
     normal, right, variance = np.zeros((BLOCKS, 3, 3)), np.zeros((BLOCKS, 3)), []
     for k in even_subset(len(position), MOST_FRAMES):
-        gap, angle, rod = _gaps_of_rods(position[k], radius)
+        gap, angle, rod = _gaps_of_rods(position[k], radius, boundary)
         if len(gap) < 2 * FEWEST_GAPS:
             continue
         variance.append(float(np.var(gap)))
@@ -86,9 +88,11 @@ def measure_section_shape(position: Array, radius: Array) -> SectionShape:
     return SectionShape(ovality, found / float(np.mean(variance)), found / error if error > 0.0 else 0.0)
 
 
-def _gaps_of_rods(position: Array, radius: Array) -> tuple[Array, Array, NDArray[np.int64]]:
+def _gaps_of_rods(
+    position: Array, radius: Array, boundary: NDArray[np.bool_] | None
+) -> tuple[Array, Array, NDArray[np.int64]]:
     """Gaps [m] of candidate pairs, each for both rods, directions [rad] from the rod, and the rods, in order."""
-    pairs = find_near_pairs(position, radius)
+    pairs = find_near_pairs(position, radius, boundary)
     overlap = pairs.gap[pairs.gap < 0.0]
     near = pairs.gap < (WIDTH * float(np.sqrt(np.mean(overlap**2))) if len(overlap) else 0.0)
     i, j, gap = pairs.i[near], pairs.j[near], pairs.gap[near]

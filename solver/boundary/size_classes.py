@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from ..bodies.grains import Array
 from ..even_subset import even_subset
@@ -77,7 +77,9 @@ def group_readings(radius: Float[Array, " n"]) -> Int[np.ndarray, " n"] | None:
     return size_class
 
 
-def find_size_classes(position: Float[Array, "f n 2"], radius: Float[Array, " n"]) -> SizeClasses | None:
+def find_size_classes(
+    position: Float[Array, "f n 2"], radius: Float[Array, " n"], boundary: Bool[np.ndarray, " n"] | None = None
+) -> SizeClasses | None:
     """Find the sizes of which the radii are readings.
 
     Parameters
@@ -86,6 +88,8 @@ def find_size_classes(position: Float[Array, "f n 2"], radius: Float[Array, " n"
         Positions [m], NaN where a grain is missing.
     radius : (n,)
         Readings [m].
+    boundary : (n,), optional
+        Grains of the boundary, of which two need not touch; None: none.
 
     Returns
     -------
@@ -109,7 +113,7 @@ def find_size_classes(position: Float[Array, "f n 2"], radius: Float[Array, " n"
     rows = even_subset(len(position), MOST_FRAMES)
     gap, design = [], []
     for place in position[rows]:
-        near = find_near_pairs(place, radius)
+        near = find_near_pairs(place, radius, boundary)
         own = count_classes(near, size_class, len(size))
         gap.append(near.gap)
         design.append(np.column_stack([deviation[near.i] + deviation[near.j], -own]))

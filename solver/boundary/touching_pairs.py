@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from ..bodies.grains import Array
@@ -42,7 +43,7 @@ class TouchingFit:
     weight: Float[Array, " m"]
 
 
-def find_near_pairs(position: Array, radius: Array) -> NearPairs:
+def find_near_pairs(position: Array, radius: Array, boundary: NDArray[np.bool_] | None = None) -> NearPairs:
     """Find the pairs of grains that may touch.
 
     Parameters
@@ -51,10 +52,14 @@ def find_near_pairs(position: Array, radius: Array) -> NearPairs:
         Positions [m] in one photograph, NaN where a grain is missing.
     radius : (n,)
         Radii [m].
+    boundary : (n,), optional
+        Grains of the boundary, whose motion is imposed: two of them need not touch; None: none.
     """
     reach = WIDEST * 2.0 * float(radius.mean())
     here = np.flatnonzero(np.isfinite(position[:, 0]))
     i, j = here[KDTree(position[here]).query_pairs(2.0 * float(radius.max()) + reach, output_type="ndarray")].T
+    if boundary is not None:
+        i, j = i[moves := ~(boundary[i] & boundary[j])], j[moves]
     branch = position[j] - position[i]
     length = np.linalg.norm(branch, axis=1)
     gap = length - radius[i] - radius[j]

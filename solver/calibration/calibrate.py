@@ -129,16 +129,12 @@ class Calibration:
         endpoints = sequence.endpoints
         if self.walls_follow:
             endpoints = scale_walls(endpoints, scale, sequence.side)
-        return MeasuredSequence(
-            sequence.radius + self.radius,
-            scale * sequence.position + self.lens * radial_distortion(sequence) + rotate_offsets(sequence, self.offset),
-            sequence.rotation,
-            sequence.present,
-            move_walls(endpoints, self.wall, self.wall_tilt, sequence.side),
-            sequence.sigma,
-            sequence.side,
-            sequence.cell,
-            sequence.centre_spread,
+        shift = self.lens * radial_distortion(sequence) + rotate_offsets(sequence, self.offset)
+        return replace(
+            sequence,
+            radius=sequence.radius + self.radius,
+            position=scale * sequence.position + shift,
+            endpoints=move_walls(endpoints, self.wall, self.wall_tilt, sequence.side),
         )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -32,6 +32,8 @@ class MeasuredSequence:
     cell: Array | None = None  # (f, 2, 2) [m] vectors of the periodic cell, in place of walls
     # (n,) expected size of a centre's constant error, over that of most grains; None: alike
     centre_spread: Array | None = None
+    # (n,) grains of the boundary, whose motion is imposed: they need not touch each other, nor walls; None: none
+    boundary: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         f, n = self.present.shape
@@ -55,9 +57,9 @@ class MeasuredSequence:
     def thinned(self, count: int) -> MeasuredSequence:
         """Select at most `count` frames, evenly spaced."""
         k = self.spread_frames(count)
-        return MeasuredSequence(
-            self.radius, self.position[k], self.rotation[k], self.present[k], self.endpoints[k], self.sigma[k],
-            self.side, None if self.cell is None else self.cell[k], self.centre_spread,
+        return replace(
+            self, position=self.position[k], rotation=self.rotation[k], present=self.present[k],
+            endpoints=self.endpoints[k], sigma=self.sigma[k], cell=None if self.cell is None else self.cell[k],
         )  # fmt: skip
 
     @property
@@ -115,8 +117,12 @@ def find_gap_rows(sequence: MeasuredSequence, reach: float, *, wall_reach: float
     wall_reach = reach if wall_reach is None else wall_reach
     n = sequence.grain_count
     frames, first, second = [], [], []
+    imposed = np.zeros(n + sequence.wall_count, np.bool_)
+    if sequence.boundary is not None:
+        imposed[:n], imposed[n:] = sequence.boundary, True
     for k in range(sequence.frame_count):
         i, j = _pairs_of_frame(sequence, k, reach, wall_reach)
+        i, j = i[moves := ~(imposed[i] & imposed[j])], j[moves]
         frames.append(np.full(len(i), k))
         first.append(i)
         second.append(j)

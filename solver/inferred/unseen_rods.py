@@ -63,6 +63,7 @@ class UnseenRods:
     position: Array  # (f, u, 2) [m]
     sigma: Array  # (f, u) [m] standard deviation of a position component
     held: Array  # (u,) contacts beyond two, mean over photographs
+    sought: bool  # False: too few photographs, no walls, or noise hides contacts
 
     @property
     def count(self) -> int:
@@ -134,7 +135,8 @@ def infer_unseen(
     known = None if sizes is None else sizes - 0.5 * overlap
     possible = radius if known is None else known
     limits = float(possible.min()), float(possible.max())
-    if frames >= FEWEST_FRAMES and endpoints.shape[1] and tolerance.apart < COARSE * limits[0]:
+    sought = frames >= FEWEST_FRAMES and endpoints.shape[1] > 0 and tolerance.apart < COARSE * limits[0]
+    if sought:
         near: Array | None = None
         for _ in range(PASSES):
             around = Surroundings(*_with(radius, position, present, rods), endpoints, noise, side)
@@ -148,12 +150,12 @@ def infer_unseen(
             rods += new
             near = np.stack([each.position for each in new], axis=1)
     if not rods:
-        return UnseenRods(np.empty(0), np.empty((len(shown), 0, 2)), np.empty((len(shown), 0)), np.empty(0))
+        return UnseenRods(np.empty(0), np.empty((len(shown), 0, 2)), np.empty((len(shown), 0)), np.empty(0), sought)
     place, sigma = np.full((len(shown), len(rods), 2), np.nan), np.full((len(shown), len(rods)), np.nan)
     place[shown] = np.stack([each.position for each in rods], axis=1)
     sigma[shown] = np.stack([each.sigma for each in rods], axis=1)
     found = np.array([each.radius for each in rods]) + 0.5 * overlap
-    return UnseenRods(found, place, sigma, np.array([each.held for each in rods]))
+    return UnseenRods(found, place, sigma, np.array([each.held for each in rods]), sought)
 
 
 def _with(

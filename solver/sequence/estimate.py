@@ -22,20 +22,14 @@ from ..convex.ensemble_members import NormalisedSlip
 from ..convex.program import Balance
 from ..detection.contact_networks import ThresholdNetwork
 from ..mixture.equilibrium_mixture import FrameBalance, mix_in_equilibrium
-from ..mixture.frame_mixture import (
-    ForceEstimate,
-    Mixture,
-    Softness,
-    limit_by_fringes,
-    motion_weight,
-    overlap_scale,
-)
+from ..mixture.frame_mixture import ForceEstimate, Mixture, Softness, limit_by_fringes, motion_weight, overlap_scale
 from ..nlgs.chain import ChainStep, advance_chain
 from ..nlgs.force_memory import ForceMemory
 from ..posterior.frame_posterior import FramePosterior
 from ..statistics.agreement import pearson
 from ..statistics.balance import worst_force_residual
-from ..statistics.stress import love_weber_stress, packing_area
+from ..statistics.packing_area import packing_area
+from ..statistics.stress import love_weber_stress
 from .boundary_load import scale_to_load
 from .ensemble import EnsembleState, solve_ensemble
 from .frame_problem import FrameProblem, PositionEstimates
@@ -259,7 +253,7 @@ def _mix(
 def mean_stress(problem: FrameProblem, estimate: Estimate) -> float:
     """Half the trace of the stress of the motion estimate [Pa] under the load, comparable from frame to frame."""
     field, place = estimate if estimate.motion is None else estimate.motion, problem.snapshot.position
-    area = packing_area(estimate.step.walls, place[problem.snapshot.present])
+    area = packing_area(estimate.step.walls, place, problem.snapshot.present, problem.packing.grains.boundary)
     stress = love_weber_stress(estimate.contacts, field.fn, field.ft, place, area, problem.packing.length)
     return 0.5 * float(np.trace(stress)) * load_scale(problem, estimate)
 
@@ -273,10 +267,10 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
     """Gather the evidence of the reported field; ε and ū are those of the recorded chain."""
     packing, snapshot, step = problem.packing, problem.snapshot, estimate.step
     pressure, load = mean_stress(problem, estimate), packing.mean_pressure(snapshot)
-    # A return from a faulty frame is no jump, nor is a change of the measured loads.
-    load_ratio = packing.load_ratio(snapshot, problem.sequence.snapshots[max(problem.k - 1, 0)])
-    former = [load_ratio * p for p in (state.pressure, state.sound_pressure) if p > 0 and not problem.scale_is_open]
-    jump = min((abs(pressure - p) / p for p in former), default=np.nan)
+    # A return from a faulty frame is no jump, nor a change of the loads; without a load, the mean stress may jump.
+    ratio = packing.load_ratio(snapshot, problem.sequence.snapshots[max(problem.k - 1, 0)])
+    former = (state.pressure, state.sound_pressure) if load > 0 else ()
+    jump = min((abs(pressure - ratio * p) / (ratio * p) for p in former if p > 0), default=np.nan)
     return Evidence(
         reset=len(state.members.soft.key) == 0,
         # Inertia alone makes no measurable correction: ε is undefined then.
@@ -304,6 +298,7 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
         power_gap=estimate.power_gap,
         scale_disagreement=estimate.scale_disagreement if not load > 0.0 and packing.scale_is_known else np.nan,
         loaded=packing.is_loaded,
+        sought=problem.settings.unseen_sought,
     )
 
 

@@ -25,12 +25,12 @@ from .force_statistics import (
     strong_network,
     tail_exponent,
 )
+from .packing_area import packing_area
 from .stress import (
     branch_vectors,
     contact_force_vectors,
     friction_angle,
     love_weber_stress,
-    packing_area,
     principal_stresses,
     sums_on_walls,
     wall_forces,
@@ -198,7 +198,7 @@ def frame_statistics(
     weight, sliding = probabilities.bearing[bearing], probabilities.sliding[bearing]
     probably_bearing = bearing & (probabilities.bearing > EVEN)
     counted = present & grains.free  # boundary grains are not in equilibrium by contacts
-    area = packing_area(walls, position[present])
+    area = packing_area(walls, position, present, grains.boundary)
     stress = love_weber_stress(contacts, fn, ft, position, area, length)
     sigma_1, sigma_2, direction = principal_stresses(stress)
     on_walls, sums = wall_forces(contacts, fn, ft), sums_on_walls(contacts, fn, ft)

@@ -3,92 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..bodies.grains import Array
-from ..bodies.wall_shapes import IN, OUT
 from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts
-
-PARALLEL = np.radians(10.0)  # greatest angle between walls of one side, as the halves of a box that is split
-CORNERS = 2048  # of the polygon that approximates a circle
-
-
-def polygon_area(corners: Array) -> float:
-    """Return the area of a polygon (m, 2) [m], counter-clockwise positive [m²]."""
-    x, y = corners[:, 0], corners[:, 1]
-    return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
-
-
-def packing_area(walls: Walls, fallback: Array) -> float:
-    """Return the area of the packing [m²].
-
-    Parameters
-    ----------
-    walls
-        The area is that of the cell, or of the polygon bounded by the lines of the straight walls, in the order of
-        their directions. A circle around the packing is cut by these lines; the area of inner circles is subtracted.
-    fallback : (n, 2)
-        Points [m] whose convex hull is used where the walls do not enclose an area.
-    """
-    if walls.cell is not None:
-        return walls.cell.area
-    radius, around = 0.5 * walls.length, np.flatnonzero(walls.sides == IN)
-    within = float(np.pi * np.sum(radius[walls.sides == OUT] ** 2))
-    if len(around):
-        narrowest = int(around[np.argmin(radius[around])])
-        return _area_in_circle(walls, narrowest) - within
-    return _area_between_lines(walls, np.flatnonzero(~walls.curved), fallback) - within
-
-
-def _area_in_circle(walls: Walls, circle: int) -> float:
-    """Return the area [m²] of a circle cut by all straight walls; the circle is a polygon of equal area."""
-    step = 2.0 * np.pi / CORNERS
-    radius = 0.5 * walls.length[circle] * np.sqrt(step / np.sin(step))
-    angle = step * np.arange(CORNERS)
-    corners = walls.centre[circle] + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    for w in np.flatnonzero(~walls.curved):
-        inside = (walls.endpoints[w, 0] - corners) @ walls.outward[w]
-        following, further = np.roll(corners, -1, axis=0), np.roll(inside, -1)
-        kept: list[Array] = []
-        for here, there, a, b in zip(corners, following, inside, further, strict=True):
-            kept += [here] if a >= 0.0 else []
-            kept += [here + a / (a - b) * (there - here)] if (a >= 0.0) != (b >= 0.0) else []
-        if not kept:
-            return 0.0
-        corners = np.array(kept)
-    return polygon_area(corners)
-
-
-def _area_between_lines(walls: Walls, straight: NDArray[np.intp], fallback: Array) -> float:
-    order = _sides(walls, straight)
-    if len(order) >= 3:
-        start, direction = walls.endpoints[order, 0], walls.direction[order]
-        corners = np.empty_like(start)
-        for k in range(len(order)):
-            previous = k - 1
-            cross = direction[previous, 0] * direction[k, 1] - direction[previous, 1] * direction[k, 0]
-            if cross < 1e-6:
-                break
-            step = start[k] - start[previous]
-            s = (step[0] * direction[k, 1] - step[1] * direction[k, 0]) / cross
-            corners[k] = start[previous] + s * direction[previous]
-        else:
-            return polygon_area(corners)
-    from scipy.spatial import ConvexHull
-
-    return float(ConvexHull(fallback).volume)
-
-
-def _sides(walls: Walls, straight: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Straight walls (s,) in the order of their directions, of nearly parallel ones the longest: halves of one side."""
-    angle = np.arctan2(walls.direction[straight, 1], walls.direction[straight, 0])
-    kept: list[int] = []
-    for k in np.argsort(-walls.length[straight], kind="stable"):
-        apart = np.abs((angle[kept] - angle[k] + np.pi) % (2.0 * np.pi) - np.pi)
-        if (apart > PARALLEL).all():
-            kept.append(int(k))
-    return straight[np.array(sorted(kept, key=lambda k: angle[k]), np.intp)]
 
 
 def contact_force_vectors(contacts: Contacts, fn: Array, ft: Array) -> Array:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...solver.bodies.grains import Grains
 from ...solver.bodies.rods import RodMaterial
 from ...solver.boundary.boundary_correction import Boundary, BoundarySettings, correct_boundary
 from ...solver.boundary.camera_distortion import ANISOTROPY, CameraDistortion, find_camera_distortion
@@ -17,7 +16,7 @@ from ...solver.detection.precision import contradiction, describe_contradiction,
 from ...solver.mixture.soft_grains import find_soft_overlap
 from ...solver.posterior.sequence_evidence import gather_position_evidence
 from ...tracks import Tracks, WallTracks, held_once
-from ..snapshots import make_snapshots, measure_sequence, pack_seen
+from ..snapshots import grains_of, make_snapshots, measure_sequence, pack_seen
 from .calibration import radius_classes
 
 # Of the relative overlap of soft grains: a lesser stretching is no error of the picture, because larger forces along
@@ -37,7 +36,7 @@ def measure_noise(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, str]:
     str
         A sentence on the contradiction; empty: none.
     """
-    grains = Grains.of_rods(tracks.radius, density=1.0, length=1.0)
+    grains = grains_of(tracks)
     found = measure_precision(grains, make_snapshots(replace(tracks, centre_sigma=None), walls))
     if found is None:
         return tracks, ""
@@ -82,7 +81,9 @@ def correct_camera(
     classes = radius_classes(tracks.radius) if classes is None else classes
     position = np.where(tracks.present[..., None], tracks.position, np.nan)
     classes = np.zeros(tracks.grain_count, np.int64) if classes is None else classes
-    found = find_camera_distortion(position, tracks.radius, classes, soft=soft and not walls.count)
+    found = find_camera_distortion(
+        position, tracks.radius, classes, soft=soft and not walls.count, boundary=tracks.boundary
+    )
     if found is None:
         return tracks, walls, "", None
     if walls.count:

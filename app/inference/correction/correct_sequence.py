@@ -95,6 +95,8 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         settings = replace(settings, sequence=replace(settings.sequence, span=span, alike=alike))
     if settings.infer_unseen:
         tracks = add_unseen(tracks, walls, known_radii(given.radius), settings.sequence.measured_overlap)
+        sequence = replace(settings.sequence, unseen_sought=tracks.inferred is not None)
+        settings = replace(settings, sequence=sequence)
         calibration = None if calibration is None else calibration.of_grains(tracks.grain_count)
     inferred = 0 if tracks.inferred is None else int(tracks.inferred.sum())
     packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from ...process.counts import state_count
 from ...solver.bodies.grains import Array
-from ...solver.bodies.rods import RodMaterial
 from ...solver.bodies.walls import Walls
 from ...solver.contacts.contacts import Contacts, detect_contacts, measure_pairs
 from ...solver.inferred.exchanged_ids import find_exchanged_ids
 from ...solver.inferred.interpolated_poses import NEIGHBOURS, interpolate_poses, neighbour_rows
 from ...solver.robust_scale import SD_OVER_MAD
 from ...tracks import Tracks, TrackStatus, WallTracks
+from ..snapshots import grains_of
 
 JUMP = 6.0  # robust standard deviations of a rod's deviation from its neighbours beyond which it jumps …
 NOISE = 6.0  # … and standard deviations of a position
@@ -187,7 +187,7 @@ class _Search:
 
     def __init__(self, tracks: Tracks, walls: WallTracks | None) -> None:
         self._tracks, self._walls = tracks, walls
-        self._grains = RodMaterial().pack(tracks.radius, np.empty(0)).grains
+        self._grains = grains_of(tracks)
         self._position = tracks.position.copy()
         self._jump = np.full_like(tracks.position, np.nan)  # from where a rod is expected
         self._suspect = np.zeros(tracks.status.shape, np.bool_)

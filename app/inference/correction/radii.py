@@ -12,9 +12,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver.bodies.interpolation import interpolate_ignored_frames
-from ...solver.bodies.motion import Snapshot
-from ...solver.bodies.packing import Packing
 from ...solver.bodies.rods import RodMaterial
 from ...solver.bodies.wall_shapes import beside_wall, distance_from_walls
 from ...solver.boundary.exchanged_sizes import find_exchanged_sizes
@@ -25,7 +22,7 @@ from ...solver.even_subset import even_subset
 from ...solver.part_settings import CalibrationSettings
 from ...solver.posterior.radius_posterior import RadiusPosterior, estimate_radii, has_radius_errors, share_errors
 from ...tracks import Tracks, WallTracks
-from ..snapshots import make_snapshots, measure_sequence
+from ..snapshots import grains_of, measure_sequence, pack_seen
 from .calibration import calibrate_tracks, radius_classes
 from .outliers import walls_in
 
@@ -58,7 +55,7 @@ def correct_exchanged_sizes(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, 
     margin = np.broadcast_to(tracks.radius[:, None], (tracks.grain_count, walls.count))
     beside = beside_wall(ends, side, place, margin)
     from_walls = np.where(beside, distance_from_walls(ends, side, place), np.nan)
-    radius = find_exchanged_sizes(position, tracks.radius, classes, from_walls)
+    radius = find_exchanged_sizes(position, tracks.radius, classes, from_walls, tracks.boundary)
     changed = np.flatnonzero(radius != tracks.radius)
     if not len(changed):
         return tracks, ""
@@ -82,7 +79,7 @@ def use_size_classes(material: RodMaterial, tracks: Tracks) -> tuple[Tracks, str
     """
     if material.stiffness in (None, "rigid") or tracks.grain_count == 0:
         return tracks, ""
-    found = find_size_classes(tracks.position, tracks.radius)
+    found = find_size_classes(tracks.position, tracks.radius, tracks.boundary)
     return (tracks, "") if found is None else (replace(tracks, radius=found.radius), found.describe())
 
 
@@ -100,10 +97,10 @@ def calibrate_with_radii(
     """
     calibrated = calibrate_tracks(settings, tracks, walls, typical_overlap, failed)
     first = calibrated[2]
-    if first is None or not has_radius_errors(*_seen(material, tracks, walls, failed)):
+    if first is None or not has_radius_errors(*pack_seen(material, tracks, walls, failed)):
         return calibrated
     shared = _correct_shared(first, tracks, walls)
-    found = estimate_radii(*_seen(material, *shared, failed), np.random.default_rng(SEED))
+    found = estimate_radii(*pack_seen(material, *shared, failed), np.random.default_rng(SEED))
     classes = radius_classes(tracks.radius)
     if classes is not None:
         found = share_errors(found, classes)
@@ -114,13 +111,6 @@ def calibrate_with_radii(
     if tracks.centre_sigma is None or not then.applied:
         tracks = replace(tracks, centre_sigma=np.full(tracks.grain_count, remaining))  # of either kind a gap has two
     return tracks, walls, _joined(first, found, then)
-
-
-def _seen(
-    material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]
-) -> tuple[Packing, list[Snapshot]]:
-    packing = material.pack(tracks.radius, walls.usual_pressure(material.length))
-    return packing, interpolate_ignored_frames(make_snapshots(tracks, walls), failed)
 
 
 def _correct_shared(found: Calibration, tracks: Tracks, walls: WallTracks) -> tuple[Tracks, WallTracks]:
@@ -171,7 +161,7 @@ def find_wrong_sizes(tracks: Tracks, walls: WallTracks | None, failed: Collectio
     sizes = radius_classes(tracks.radius)
     if sizes is None:
         return {}
-    grains, depth, of_size = RodMaterial().pack(tracks.radius, np.empty(0)).grains, [], []
+    grains, depth, of_size = grains_of(tracks), [], []
     for k in sorted(set(range(tracks.frame_count)) - set(failed)):
         present = np.isfinite(tracks.position[k, :, 0])
         near = detect_contacts(grains, tracks.position[k], present, walls_in(walls, k), 0.0)
@@ -209,7 +199,7 @@ def find_oversized_rods(tracks: Tracks) -> dict[int, float]:
     Pairs count whose overlap is more than DEEP of the smaller radius in more than half of the photographs that are read
     and show both; no rod is so soft. Of their rods that with the most such pairs is wrong, then of the rest.
     """
-    grains = RodMaterial().pack(tracks.radius, np.empty(0)).grains
+    grains = grains_of(tracks)
     read = _frames_read(tracks)
     deep: dict[tuple[int, int], list[float]] = {}
     for k in read.tolist():

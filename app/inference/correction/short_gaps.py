@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...process.counts import state_count
-from ...solver.bodies.rods import RodMaterial
 from ...solver.inferred.interpolated_poses import interpolate_poses, settle_poses
 from ...tracks import Tracks, TrackStatus, WallTracks
+from ..snapshots import grains_of
 from .outliers import walls_in
 
 LONGEST = 2  # photographs without a pose; neighbours rearrange over longer gaps
@@ -42,7 +42,7 @@ def interpolate_short_gaps(tracks: Tracks, walls: WallTracks | None = None) -> t
         return tracks, ""
     position, rotation, status = tracks.position.copy(), tracks.rotation.copy(), tracks.status.copy()
     sigma = tracks.sigma.copy()
-    grains = RodMaterial().pack(tracks.radius, np.empty(0)).grains
+    grains = grains_of(tracks)
     for k in np.flatnonzero(gaps.any(axis=1)).tolist():
         poses = interpolate_poses(tracks.time, tracks.position, k, np.flatnonzero(gaps[k]))
         noise = float(np.median(tracks.sigma[k][tracks.present_in(k)]))

@@ -23,12 +23,19 @@ def add_unseen(tracks: Tracks, walls: WallTracks, sizes: Array | None, overlap: 
         Known radii [m]; None: any.
     overlap : float
         Mean overlap of touching grains where they are soft [m].
+
+    Returns
+    -------
+    Tracks
+        The same where too little is known to seek them.
     """
     present = tracks.present
     noise = float(np.sqrt(np.mean(tracks.position_sigma**2)))
     found = infer_unseen(
         tracks.radius, tracks.position, present, walls.endpoints, UnseenRodSettings(noise, sizes, overlap), walls.side
     )
+    if not found.sought:
+        return tracks
     if not found.count:
         return replace(tracks, inferred=np.zeros(tracks.grain_count, bool))
     f, u = tracks.frame_count, found.count

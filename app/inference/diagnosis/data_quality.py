@@ -21,7 +21,7 @@ from ...solver.detection.refinement import refine
 from ...solver.detection.touch_probability import ContactProbabilitySettings
 from ...solver.posterior.sequence_evidence import gather_position_evidence
 from ...tracks import Tracks, WallTracks
-from ..snapshots import make_snapshots
+from ..snapshots import grains_of, make_snapshots
 
 EXAMINED_PHOTOGRAPHS = 3
 UNCLEAR_GAPS = 0.009  # standard deviation of the gaps of touching grains over a diameter that hides the contacts
@@ -115,7 +115,7 @@ def measure_data_quality(tracks: Tracks, walls: WallTracks | None) -> DataQualit
     if count < 2 or not np.isfinite(ends.endpoints).all() or int(first.present.all(axis=0).sum()) < 4:
         return None
     snapshots = make_snapshots(first, ends)
-    grains = Grains.of_rods(first.radius, density=1.0, length=1.0)
+    grains = grains_of(first)
     stated = float(np.median(first.position_sigma))
     found = measure_precision(grains, snapshots)
     noise = stated if found is None else stated * contradiction(found, stated)

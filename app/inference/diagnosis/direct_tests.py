@@ -19,6 +19,7 @@ from ...solver.contacts.contacts import detect_contacts
 from ...tracks import Tracks, WallTracks
 from ..correction.outliers import find_outliers, walls_in
 from ..correction.radii import NAMED, find_oversized_rods, find_wrong_sizes
+from ..snapshots import grains_of
 from .causes import finding
 from .wall_times import rods_beside
 
@@ -166,7 +167,7 @@ def find_impossible_poses(tracks: Tracks, walls: WallTracks | None = None) -> ND
     outlier = find_outliers(tracks, walls)
     if not outlier.any():
         return outlier
-    grains, depth, usual = RodMaterial().pack(tracks.radius, np.empty(0)).grains, np.zeros(outlier.shape), []
+    grains, depth, usual = grains_of(tracks), np.zeros(outlier.shape), []
     for k in range(tracks.frame_count):
         present, wrong = np.isfinite(tracks.position[k, :, 0]), np.append(outlier[k], False)
         near = detect_contacts(grains, tracks.position[k], present, walls_in(walls, k), 0.0)

@@ -16,7 +16,7 @@ VISIBLE = 5e-3  # ovality below which forces are found nevertheless
 
 def examine_sections(tracks: Tracks) -> list[Finding]:
     """Look for sections that are not round, by gaps at opposite sides of a rod and at right angles."""
-    shape = measure_section_shape(tracks.position, tracks.radius)
+    shape = measure_section_shape(tracks.position, tracks.radius, tracks.boundary)
     if shape.significance < SIGNIFICANT or shape.fraction < DOMINANT or shape.ovality < VISIBLE:
         return []
     words = (

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from ...results.finding import Finding
 from ...solver.assessment.penalties import limit_trust
 from ...solver.bodies.grains import Array
-from ...solver.bodies.rods import RodMaterial
 from ...solver.contacts.contacts import detect_contacts
 from ...solver.detection.precision import noise_by_second_changes
 from ...solver.even_subset import even_subset
@@ -18,6 +17,7 @@ from ...solver.frame_forces import FrameForces
 from ...solver.robust_scale import SD_OVER_MAD
 from ...tracks import Tracks, TrackStatus
 from ..correction.outliers import walls_in
+from ..snapshots import grains_of
 from .causes import finding
 
 WINDOW, WINDOWS = 12, 4  # photographs whose changes are compared, and how many such windows of a long test
@@ -141,7 +141,7 @@ def _stated_noise(tracks: Tracks) -> float:
 def _neighbouring_gaps(tracks: Tracks, first: int, end: int) -> Array:
     """Gaps (f, p) [m] of the pairs that stay neighbours in photographs `first` to `end`; NaN where one is lost."""
     middle, reach = (first + end) // 2, REACH * 2.0 * float(tracks.radius.mean())
-    grains = RodMaterial().pack(tracks.radius, np.empty(0)).grains
+    grains = grains_of(tracks)
     near = detect_contacts(grains, tracks.position[middle], tracks.present_in(middle), walls_in(None, middle), reach)
     apart = tracks.position[first:end, near.j] - tracks.position[first:end, near.i]
     gap = np.hypot(apart[..., 0], apart[..., 1]) - tracks.radius[near.i] - tracks.radius[near.j]

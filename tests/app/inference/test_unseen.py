@@ -63,3 +63,9 @@ def test_a_complete_packing_keeps_its_rods(poses) -> None:
     assert found.grain_count == tracks.grain_count
     assert found.inferred is not None
     assert not found.inferred.any()
+
+
+def test_without_walls_nothing_is_sought(poses) -> None:
+    tracks, walls = tracked(poses, GONE)
+    without = WallTracks((), walls.endpoints[:, :0], walls.pressure[:0])
+    assert add_unseen(tracks, without, np.unique(poses["radius"])).inferred is None

@@ -79,7 +79,7 @@ MUTANTS = [
     *mutants_of(
         "solver/sequence/estimate.py",
         "tests/solver/sequence/test_frames.py",
-        (" if p > 0 and not problem.scale_is_open]", " if p > 0]"),
+        ("(state.pressure, state.sound_pressure) if load > 0 else ()", "(state.pressure, state.sound_pressure)"),
     ),
     *mutants_of(
         "solver/sequence/estimate.py",

@@ -14,10 +14,16 @@ MUTANTS = [
         ("resultant_norms(contacts, fn, ft, weight)[present].max", "resultant_norms(contacts, fn, ft, weight).max"),
     ),
     *mutants_of(
+        "solver/statistics/packing_area.py",
+        "tests/solver/statistics/test_packing_area.py",
+        ("if (apart > PARALLEL).all():", "if (apart > 0.0).all():"),
+        ("sides > 4.0 * WIDEST_PORE * apart * area", "sides > 0.0"),
+        ("None if boundary is None else boundary[present]", "boundary"),
+    ),
+    *mutants_of(
         "solver/statistics/stress.py",
         STATISTICS,
         ("/ (area * length)", "/ area"),
-        ("if (apart > PARALLEL).all():", "if (apart > 0.0).all():"),
         ("end[pair] = contacts.second_centre(position)[pair]", "end[pair] = contacts.point[pair]"),
         ("float(np.arcsin(np.clip((major - minor)", "float(np.arctan(np.clip((major - minor)"),
         ("return float(values[1]), float(values[0]), angle", "return float(values[0]), float(values[1]), angle"),

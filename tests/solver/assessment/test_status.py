@@ -12,6 +12,7 @@ from rodsight.solver.assessment.status import (
     CHAIN_UNBALANCED,
     LOAD_FRACTIONS,
     NEW_FORCES,
+    RELIABLE,
     SETTLED_CORRECTION,
     SETTLED_DIFFERENCE,
     SETTLING_FRAMES,
@@ -53,7 +54,7 @@ def test_sound_evidence_is_settled_and_trusted():
         ({"load_fraction": 0.99 * LOAD_FRACTIONS[0]}, "load"),
         ({"load_fraction": 1.01 * LOAD_FRACTIONS[1]}, "load"),
         ({"correction": 1.01 * SUSPECT_CORRECTION}, "ε"),
-        ({"pressure_jump": 1.01 * SUSPECT_PRESSURE_JUMP}, "jumped"),
+        ({"pressure_jump": 1.01 * SUSPECT_PRESSURE_JUMP, "disagreement": 0.4}, "jumped"),
         ({"unseen_fraction": 1.01 * MAX_UNSEEN_FRACTION}, "unreadable"),
     ],
 )
@@ -63,6 +64,16 @@ def test_each_fault_makes_a_frame_suspect_and_is_reported(fault, word):
     assert status is FrameStatus.SUSPECT
     assert is_suspect(faulty)
     assert word in why
+
+
+@pytest.mark.parametrize("sudden", [{"correction": 1.01 * SUSPECT_CORRECTION}, {"pressure_jump": 0.5}])
+def test_sudden_motion_or_stress_is_no_contradiction_where_the_forces_are_reliable(sudden):
+    evident = replace(SOUND, **sudden, disagreement=0.05, agreement=0.97, position_agreement=0.97)
+    assert trust(evident) > RELIABLE
+    assert not is_suspect(evident)
+    disagreeing = replace(evident, disagreement=0.4, agreement=0.6)
+    assert trust(disagreeing) < RELIABLE
+    assert is_suspect(disagreeing)
 
 
 def test_all_faults_are_reported_together():
@@ -148,6 +159,7 @@ def test_holes_are_reported_and_only_inferred_rods_lower_the_trust():
     assert trust(replace(SOUND, inferred=3, grains=600)) < trust(SOUND)
     assert "3 holes" in decide_status(holed)[1]
     assert "hole" not in decide_status(SOUND)[1]
+    assert "hole" not in decide_status(replace(holed, sought=True))[1]  # no neighbour demands a rod there
 
 
 def test_the_trust_of_a_single_chain_falls_with_its_gap_threshold():

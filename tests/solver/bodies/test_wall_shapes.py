@@ -24,7 +24,8 @@ from rodsight.solver.bodies.wall_shapes import (
 from rodsight.solver.bodies.walls import Walls
 from rodsight.solver.contacts.contacts import detect_contacts, measure_contacts, measure_pairs
 from rodsight.solver.contacts.kinematics import equilibrium_matrix, relative_motion
-from rodsight.solver.statistics.stress import love_weber_stress, packing_area, wall_forces
+from rodsight.solver.statistics.packing_area import packing_area
+from rodsight.solver.statistics.stress import love_weber_stress, wall_forces
 
 from tests.packings import LENGTH, rods
 

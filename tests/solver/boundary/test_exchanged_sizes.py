@@ -131,3 +131,15 @@ def test_a_loose_grain_gets_its_size_back_once_its_neighbours_have_theirs() -> N
     found = find_exchanged_sizes(position, radius, np.unique(radius, return_inverse=True)[1])
     assert found[:7].tolist() == [0.011] + [0.008] * 6
     assert np.array_equal(found[7:], radius[7:])
+
+
+def test_rods_glued_side_by_side_show_no_sizes(packing) -> None:
+    """Rods of the boundary overlap each other, as in a chain for a smooth wall, and keep their stated sizes."""
+    position, radius, classes = packing
+    chain = np.column_stack([position[..., 0].max() + 0.1 + np.unique(radius)[1:].sum() * np.arange(5), np.zeros(5)])
+    glued = np.concatenate([position, np.broadcast_to(chain, (len(position), 5, 2))], axis=1)
+    stated = np.append(radius, np.full(5, radius.max()))
+    sizes = np.append(classes, np.full(5, classes[radius.argmax()]))
+    assert not np.array_equal(find_exchanged_sizes(glued, stated, sizes), stated)
+    boundary = np.arange(len(stated)) >= len(radius)
+    assert np.array_equal(find_exchanged_sizes(glued, stated, sizes, boundary=boundary), stated)

@@ -1,4 +1,5 @@
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 from rodsight.solver.calibration.gaps import GapRows, MeasuredSequence, find_gap_rows, measure_gaps
@@ -45,3 +46,17 @@ def test_the_gap_of_two_grains_is_their_distance_less_both_radii():
     distance = PITCH * np.sqrt(2.0)
     np.testing.assert_allclose(found.gap, distance - radius[2] - radius[SIDE + 3], rtol=1e-9)
     np.testing.assert_allclose(found.normal, [[np.sqrt(0.5), np.sqrt(0.5)]], rtol=1e-9)
+
+
+def test_boundary_grains_need_not_touch_each_other_nor_walls():
+    sequence = square_of_grains()
+    boundary = np.arange(sequence.grain_count) < 2 * SIDE  # two columns of the lattice, the first one at a wall
+    reach = 1.1 * (PITCH - 2 * R)
+    everywhere = find_gap_rows(sequence, reach, wall_reach=1e-3)
+    rows = find_gap_rows(replace(sequence, boundary=boundary), reach, wall_reach=1e-3)
+    imposed = np.append(boundary, np.ones(sequence.wall_count, bool))
+    assert not (imposed[rows.i] & imposed[rows.j]).any()
+    moves = ~(imposed[everywhere.i] & imposed[everywhere.j])
+    assert 0 < moves.sum() < everywhere.count
+    np.testing.assert_array_equal(np.stack([rows.i, rows.j]), np.stack([everywhere.i, everywhere.j])[:, moves])
+    assert replace(sequence, boundary=boundary).thinned(1).boundary is boundary

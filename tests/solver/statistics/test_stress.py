@@ -1,14 +1,13 @@
 import numpy as np
 import pytest
-from rodsight.solver.bodies.walls import Walls
 from rodsight.solver.contacts.connectivity import coordination_number, rattlers
 from rodsight.solver.contacts.contacts import detect_contacts
 from rodsight.solver.statistics.fabric import contact_fabric, fabric_anisotropy
+from rodsight.solver.statistics.packing_area import packing_area
 from rodsight.solver.statistics.stress import (
     friction_angle,
     grain_stresses,
     love_weber_stress,
-    packing_area,
     principal_stresses,
     sums_on_walls,
     wall_forces,
@@ -64,23 +63,6 @@ def test_principal_direction_rotates_with_the_stress():
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     _, _, direction = principal_stresses(turn @ np.diag([3.0, 1.0]) @ turn.T)
     assert direction == pytest.approx(angle)
-
-
-def test_area_of_a_sheared_box_is_that_of_its_parallelogram():
-    c = np.array([[0.0, 0.0], [0.5, 0.0], [0.6, 0.6], [0.1, 0.6]])
-    walls = Walls(np.stack([c, np.roll(c, -1, axis=0)], axis=1), np.zeros((4, 2, 2)), np.full(4, np.nan))
-    assert packing_area(walls, c) == pytest.approx(0.3)
-    shuffled = Walls(walls.endpoints[[2, 0, 3, 1]], walls.velocity, walls.load)
-    assert packing_area(shuffled, c) == pytest.approx(0.3)
-
-
-@pytest.mark.parametrize("turned", [-2e-4, 0.0, 2e-4])
-def test_halves_of_a_side_are_one_side_of_the_area(turned):
-    """Lines that are nearly parallel meet far away, so that their polygon has any area."""
-    c = np.array([[0.0, 0.0], [0.5, 0.0], [0.5, 0.25], [0.51, 0.25], [0.51 + 0.35 * turned, 0.6], [0.0, 0.6]])
-    ends = np.stack([c, np.roll(c, -1, axis=0)], axis=1)[[0, 1, 3, 4, 5]]  # the upper half is displaced
-    walls = Walls(ends, np.zeros((5, 2, 2)), np.full(5, np.nan))
-    assert packing_area(walls, c) == pytest.approx(0.51 * 0.6, rel=1e-3)
 
 
 def test_rattlers_are_removed_until_none_is_left():
