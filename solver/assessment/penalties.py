@@ -64,7 +64,14 @@ def assess(evidence: Evidence) -> Assessment:
 
 def find_penalties(evidence: Evidence) -> list[Penalty]:
     """All penalties of a frame, the largest first."""
-    found = [_boundary(evidence), _softness(evidence), _unseen(evidence), _size(evidence), *_contradictions(evidence)]
+    found = [
+        _boundary(evidence),
+        _missing_force(evidence),
+        _softness(evidence),
+        _unseen(evidence),
+        _size(evidence),
+        *_contradictions(evidence),
+    ]
     return sorted((each for each in found if each is not None and each.fraction > 0.0), reverse=True)
 
 
@@ -265,6 +272,16 @@ def _boundary(evidence: Evidence) -> Penalty | None:
     beyond = evidence.information.beyond
     words = f"{beyond} grains are beyond a wall, which carries no force there: correct the walls' ends or their place"
     return Penalty(BEYOND_WALL_LOSS * beyond / max(evidence.grains, 1), words)
+
+
+def _missing_force(evidence: Evidence) -> Penalty | None:
+    """What is left of r if only the forces were missing that would hold the grains: 1/√(1 + x), x their share."""
+    share = evidence.missing_force
+    words = (
+        f"grains that nothing holds lack forces of {100.0 * math.sqrt(share):.0f} % of all others (rms): find the "
+        "contact, the wall or the rod that holds them"
+    )
+    return Penalty(1.0 - 1.0 / math.sqrt(1.0 + share), words) if share > 0.0 else None
 
 
 def _softness(evidence: Evidence) -> Penalty | None:

@@ -15,10 +15,11 @@ from .trust import MAX_UNSEEN_FRACTION, motion_assessment
 SUSPECT_CORRECTION = 0.25  # ε beyond which the forces contradict the motion
 MOSTLY_POSITIONS = 0.6  # weight of the position-only estimate above which ε no longer makes a frame suspect
 SUSPECT_PRESSURE_JUMP = 0.15  # |Δp| / p between frames
-# T from which neither ε nor a jump makes a frame suspect: with all evidence, r is then below .87 in one frame of twenty
-# at most, so that these two are sudden motion and sudden stress, and no contradiction.
+# T from which neither ε nor a jump makes a frame suspect whose forces are in balance: r is then below .87 in one frame
+# of twenty at most, so that these two are sudden motion and sudden stress, and no contradiction.
 RELIABLE = 0.9
-UNBALANCED = 0.05  # worst |ΣF| of a grain over the mean f_n: below .01 in sound fields, .1 to 10 in faulty ones
+IN_BALANCE = 0.01  # worst |ΣF| of a grain over the mean f_n: below it where friction and contacts can hold it
+UNBALANCED = 0.05  # worst |ΣF| of a grain over the mean f_n: .1 to 10 in faulty fields
 CHAIN_UNBALANCED = 0.15  # the same for a single chain, which gives the motion some weight: up to .07 in sound ones
 # Mean stress over the stress of the loads: (1 + 1/K)/2 to (1 + K)/2 with K = 4, beyond what granular matter withstands.
 LOAD_FRACTIONS = (0.62, 2.5)
@@ -132,7 +133,7 @@ def find_faults(evidence: Evidence) -> list[str]:
             f"pathological: the mean stress is {evidence.load_fraction:.2f} of the load, which allows "
             f"{LOAD_FRACTIONS[0]} to {LOAD_FRACTIONS[1]}: force chains are missing or jammed"
         )
-    if motion_assessment(evidence).trust >= RELIABLE:
+    if motion_assessment(evidence).trust >= RELIABLE and evidence.unbalance < IN_BALANCE:
         return faults
     if evidence.correction > SUSPECT_CORRECTION and evidence.position_weight < MOSTLY_POSITIONS:
         faults.append(

@@ -27,7 +27,7 @@ from ..nlgs.chain import ChainStep, advance_chain
 from ..nlgs.force_memory import ForceMemory
 from ..posterior.frame_posterior import FramePosterior
 from ..statistics.agreement import pearson
-from ..statistics.balance import worst_force_residual
+from ..statistics.balance import ForceResidual, measure_force_residual
 from ..statistics.packing_area import packing_area
 from ..statistics.stress import love_weber_stress
 from .boundary_load import scale_to_load
@@ -149,9 +149,11 @@ def _combine(
 def _evidence_of_mixture(problem: FrameProblem, mixed: Estimate, alone: Evidence, state: SequenceState) -> Evidence:
     """Evidence of the mixed field: that of the motion estimate, but for what depends on the reported forces."""
     assert mixed.mixture is not None
+    residual = _force_residual(problem, mixed)
     return replace(
         alone,
-        unbalance=_worst_residual(problem, mixed),
+        unbalance=residual.worst,
+        missing_force=residual.missing,
         mixed_trust=mixed.mixture.trust,
         position_weight=mixed.mixture.position_weight,
         information=_motion_information(problem, mixed),
@@ -270,6 +272,7 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
     # A return from a faulty frame is no jump, nor a change of the loads; without a load, the mean stress may jump.
     ratio = packing.load_ratio(snapshot, problem.sequence.snapshots[max(problem.k - 1, 0)])
     former = (state.pressure, state.sound_pressure) if load > 0 else ()
+    residual = _force_residual(problem, estimate)
     jump = min((abs(pressure - ratio * p) / (ratio * p) for p in former if p > 0), default=np.nan)
     return Evidence(
         reset=len(state.members.soft.key) == 0,
@@ -279,7 +282,8 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
         old_unbalance=step.old_unbalance,
         pressure_jump=jump,
         load_fraction=pressure / load if load > 0 and not any(packing.material.gravity) else np.nan,
-        unbalance=_worst_residual(problem, estimate),
+        unbalance=residual.worst,
+        missing_force=residual.missing,
         shear=shear_over(problem.motion),
         frames_since_event=state.frames_since_event + 1,
         start_difference=estimate.start_difference,
@@ -302,10 +306,10 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
     )
 
 
-def _worst_residual(problem: FrameProblem, estimate: Estimate) -> float:
-    """Worst |ΣF| on a grain over the mean f_n, of the reported field."""
+def _force_residual(problem: FrameProblem, estimate: Estimate) -> ForceResidual:
+    """What is left of the equilibrium of all free grains, of the reported field."""
     packing, balanced = problem.packing, problem.snapshot.present & problem.packing.grains.free
-    return worst_force_residual(estimate.contacts, estimate.fn, estimate.ft, packing.weight, balanced)
+    return measure_force_residual(estimate.contacts, estimate.fn, estimate.ft, packing.weight, balanced)
 
 
 def _motion_information(problem: FrameProblem, estimate: Estimate) -> MotionInformation:

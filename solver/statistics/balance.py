@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,14 +52,28 @@ def grain_unbalance(contacts: Contacts, fn: Array, ft: Array, weight: Array, pre
     return unbalance
 
 
-def worst_force_residual(contacts: Contacts, fn: Array, ft: Array, weight: Array, present: NDArray[np.bool_]) -> float:
-    """Return the greatest |ΣF| on a present grain over the mean f_n.
+class ForceResidual(NamedTuple):
+    """What is left of the equilibrium of all grains."""
 
-    The mean is over contacts that bear force; 0 where none does, NaN for forces that are not finite.
+    worst: float  # greatest |ΣF| of a grain over the mean f_n
+    missing: float  # Σ |ΣF|² of the grains over 2 Σ f_n²: at least so much of the squared forces is missing
+
+
+def measure_force_residual(
+    contacts: Contacts, fn: Array, ft: Array, weight: Array, present: NDArray[np.bool_]
+) -> ForceResidual:
+    """Measure what is left of the equilibrium of the present grains (n,).
+
+    Means are over contacts that bear force; both are 0 where none does, NaN for forces that are not finite.
+
+    Notes
+    -----
+    A force f that is missing between two grains leaves ΣF = f on both.
     """
     if not (np.isfinite(fn).all() and np.isfinite(ft).all()):
-        return float("nan")
+        return ForceResidual(float("nan"), float("nan"))
     mean = mean_normal_force(fn)
-    return (
-        float(resultant_norms(contacts, fn, ft, weight)[present].max(initial=0.0) / mean) if np.isfinite(mean) else 0.0
-    )
+    if not np.isfinite(mean):
+        return ForceResidual(0.0, 0.0)
+    residual = resultant_norms(contacts, fn, ft, weight)[present]
+    return ForceResidual(float(residual.max(initial=0.0) / mean), float(residual @ residual / (2.0 * (fn @ fn))))

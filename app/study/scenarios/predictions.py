@@ -35,10 +35,15 @@ TRUE_CAUSE: dict[ScenarioName, tuple[str, ...]] = {
     "walls_late": ("walls_shifted",), "left_late": ("walls_shifted",), "top_fixed": ("wall_at_rest", "wall_misplaced"),
     "wall_inside": ("wall_misplaced",), "aspect_03": ("stretched_picture",), "aspect_1": ("stretched_picture",),
     "lens_03": ("lens",), "outer_theta_sign": ("rotation_sign",), "outer_mu_05": ("friction",),
+    "unloaded_mu_01": ("friction",), "unloaded_theta_degrees": ("rotation_in_degrees",),
+    "unloaded_time_reversed": ("photographs_reversed",), "unloaded_class_2": ("class_radii",),
+    "unloaded_walls_late": ("walls_shifted",), "unloaded_rolling": ("rolling_resistance",),
+    "unloaded_inertia": ("inertia",),
     "soft_stretched": ("stretched_picture",), "softer_stretched": ("stretched_picture",),
     "class_2": ("class_radii",), "wrong_class": ("exchanged_sizes",),
     **dict.fromkeys(
-        ("some_radii", "stepped_some_radii", "annulus_some_radii"), ("not_explained", "all_radii", "class_radii")
+        ("some_radii", "stepped_some_radii", "annulus_some_radii", "unloaded_some_radii"),
+        ("not_explained", "all_radii", "class_radii"),
     ),
     "rising_lens": ("lens", "not_explained"),
     "outliers": ("outlier_tracks",), "one_jump": ("outlier_tracks",), "missing_poses": ("missing_poses",),

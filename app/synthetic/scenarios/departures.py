@@ -88,6 +88,11 @@ def omit_loads(observed: ObservedData, rng: np.random.Generator) -> ObservedData
     return replace(observed, known=replace(observed.known, pressure={}))
 
 
+def omit_loads_after(depart: Departure) -> Departure:
+    """State no load of any wall, after another departure."""
+    return lambda observed, rng: omit_loads(depart(observed, rng), rng)
+
+
 def state_membrane(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
     """State as the boundary all rods that a membrane on the right touches in any photograph."""
     top = observed.endpoints[:, observed.wall_names.index("top"), :, 1].mean(axis=1)

@@ -29,4 +29,7 @@ ScenarioName = Literal[
     "mu_01", "mu_05", "walls_late", "left_late", "top_fixed", "wall_inside",
     "aspect_03", "aspect_1", "lens_03", "class_2", "some_radii", "wrong_class", "overhang", "outliers", "one_jump",
     "missing_poses", "exchanged_ids", "stepped_some_radii", "annulus_some_radii", "rising_lens",
+    "unloaded_annulus", "unloaded_biaxial", "unloaded_cyclic", "unloaded_loose", "unloaded_noise_40",
+    "unloaded_step_05", "unloaded_rolling", "unloaded_inertia", "unloaded_mu_01", "unloaded_theta_degrees",
+    "unloaded_time_reversed", "unloaded_class_2", "unloaded_walls_late", "unloaded_some_radii",
 ]  # fmt: skip

@@ -25,6 +25,7 @@ from .departures import (
     misstate_wall_ends,
     move_camera,
     omit_loads,
+    omit_loads_after,
     omit_rods,
     scatter_radii,
     shrink_radii,
@@ -377,3 +378,17 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     "annulus_some_radii": _wrong("annulus; a fifth of the rods stated 2 % too large", misstate_some, TURNED),
     "rising_lens": _wrong("rising loads; seen through a lens as in `lens_03`", distort_picture(0.003), RISING),
 }  # fmt: skip
+# The same without a stated load: nothing but motion and positions shows how much the contacts bear.
+UNLOADED: dict[ScenarioName, ScenarioName] = {
+    "unloaded_annulus": "annulus", "unloaded_biaxial": "biaxial", "unloaded_cyclic": "cyclic",
+    "unloaded_loose": "loose", "unloaded_noise_40": "noise_40", "unloaded_step_05": "step_05",
+    "unloaded_rolling": "rolling", "unloaded_inertia": "inertia", "unloaded_mu_01": "mu_01",
+    "unloaded_theta_degrees": "theta_degrees", "unloaded_time_reversed": "time_reversed",
+    "unloaded_class_2": "class_2", "unloaded_walls_late": "walls_late", "unloaded_some_radii": "annulus_some_radii",
+}  # fmt: skip
+for _name, _loaded in UNLOADED.items():
+    _of = SCENARIOS[_loaded]
+    SCENARIOS[_name] = replace(
+        _of, meaning=f"`{_loaded}`; the load is not stated", departure=omit_loads_after(_of.departure),
+        scale_stated=False,
+    )  # fmt: skip

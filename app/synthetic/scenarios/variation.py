@@ -27,7 +27,7 @@ RODS = 0.6, 1.4  # factors of the number of rods
 STIFFEST, SOFT = 1e9, 1e7  # [N/m]
 SAME_AT_WALLS, LOOSE, OTHER_SIZES = 0.6, 0.25, 0.5  # probabilities
 # They state a coefficient that is right or wrong by a given amount.
-STATED_FRICTION = frozenset({"mu_low", "mu_high", "mu_01", "mu_05", "outer_mu_05"})
+STATED_FRICTION = frozenset({"mu_low", "mu_high", "mu_01", "mu_05", "outer_mu_05", "unloaded_mu_01"})
 
 
 def vary_scenario(name: ScenarioName, seed: int) -> tuple[Scenario, float]:

@@ -11,7 +11,8 @@ MUTANTS = [
         ("np.subtract.at(sums, i, force.ravel())", "np.add.at(sums, i, force.ravel())"),
         ("sums = np.tile(weight[:, axis], len(start))", "sums = np.tile(0.0 * weight[:, axis], len(start))"),
         ("fn * normal[:, axis] + ft * tangent[:, axis]", "fn * normal[:, axis] - ft * tangent[:, axis]"),
-        ("resultant_norms(contacts, fn, ft, weight)[present].max", "resultant_norms(contacts, fn, ft, weight).max"),
+        ("resultant_norms(contacts, fn, ft, weight)[present]", "resultant_norms(contacts, fn, ft, weight)"),
+        ("residual @ residual / (2.0 * (fn @ fn))", "residual @ residual / (fn @ fn)"),
     ),
     *mutants_of(
         "solver/statistics/packing_area.py",

@@ -83,6 +83,13 @@ def test_penalties_beside_the_evidence_have_their_size():
     assert assess(chain).trust == pytest.approx(motion_assessment(chain).trust * (1.0 - SOFT_CHAIN_LOSS))
 
 
+def test_forces_that_balance_lacks_are_missing_in_the_correlation():
+    unheld = replace(ASSESSED, missing_force=3.0)
+    assert assess(unheld) == pytest.approx([0.5 * each for each in assess(ASSESSED)])
+    assert "lack forces of 173 % of all others" in describe_penalties(unheld)
+    assert describe_penalties(replace(ASSESSED, missing_force=1e-4)) == describe_penalties(ASSESSED)
+
+
 def test_no_constant_caps_the_trust_of_a_suspect_frame():
     suspect = replace(ASSESSED, pressure_jump=0.9)
     assert assess(suspect) == assess(ASSESSED)

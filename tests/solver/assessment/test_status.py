@@ -71,6 +71,7 @@ def test_sudden_motion_or_stress_is_no_contradiction_where_the_forces_are_reliab
     evident = replace(SOUND, **sudden, disagreement=0.05, agreement=0.97, position_agreement=0.97)
     assert trust(evident) > RELIABLE
     assert not is_suspect(evident)
+    assert is_suspect(replace(evident, unbalance=0.02))  # no forces in balance are near what is measured
     disagreeing = replace(evident, disagreement=0.4, agreement=0.6)
     assert trust(disagreeing) < RELIABLE
     assert is_suspect(disagreeing)

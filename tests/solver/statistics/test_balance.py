@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from rodsight.solver.contacts.contacts import Contacts, detect_contacts
 from rodsight.solver.nlgs.solve import NlgsSettings, relative_force_residual, solve
-from rodsight.solver.statistics.balance import grain_unbalance, resultant_forces, resultant_norms, worst_force_residual
+from rodsight.solver.statistics.balance import (
+    grain_unbalance,
+    measure_force_residual,
+    resultant_forces,
+    resultant_norms,
+)
 
 from tests.packings import heap_at_rest, problem_of, squeezed_heap
 
@@ -51,7 +56,7 @@ def test_heap_at_rest_is_in_equilibrium_with_its_weight() -> None:
     here = np.ones(heap.packing.grains.count, bool)
     unbalance = grain_unbalance(heap.contacts, heap.fn, heap.ft, heap.packing.weight, here)
     assert unbalance.max() < SOLVED
-    assert worst_force_residual(heap.contacts, heap.fn, heap.ft, heap.packing.weight, here) == unbalance.max()
+    assert measure_force_residual(heap.contacts, heap.fn, heap.ft, heap.packing.weight, here).worst == unbalance.max()
     weightless = np.zeros_like(heap.packing.weight)
     assert grain_unbalance(heap.contacts, heap.fn, heap.ft, weightless, here).min() > 0.1
 
@@ -63,7 +68,7 @@ def test_absent_grains_and_no_forces_give_nan() -> None:
     assert np.isnan(found).tolist() == (~here).tolist()
     none = np.zeros_like(heap.fn)
     assert np.isnan(grain_unbalance(heap.contacts, none, none, heap.packing.weight, here)).all()
-    assert worst_force_residual(heap.contacts, none, none, heap.packing.weight, here) == 0.0
+    assert measure_force_residual(heap.contacts, none, none, heap.packing.weight, here) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("gravity", [(0.0, 0.0), (0.0, -9.81)])
@@ -84,6 +89,7 @@ def test_worst_residual_is_over_present_grains() -> None:
     size = resultant_norms(heap.contacts, fn, heap.ft, nothing)
     worst = int(np.argmax(size))
     for here in (np.ones(n, bool), np.arange(n) != worst):
-        found = worst_force_residual(heap.contacts, fn, heap.ft, nothing, here)
-        assert found == pytest.approx(size[here].max() / fn.mean())
+        found = measure_force_residual(heap.contacts, fn, heap.ft, nothing, here)
+        assert found.worst == pytest.approx(size[here].max() / fn.mean())
+        assert found.missing == pytest.approx(np.sum(size[here] ** 2) / (2.0 * np.sum(fn**2)))
     assert size[np.arange(n) != worst].max() < 0.99 * size[worst]
