@@ -297,13 +297,18 @@ def neighbour_spacing(position: Array, radius: Array) -> Array:
 
 
 def check_inside(sources: PackingSources, tracks: Tracks, walls: WallTracks) -> None:
-    """Raise InputError where a centre lies beyond a wall by more than its radius: a wrong unit, origin or direction."""
+    """Raise InputError where a centre lies beyond a wall by more than its radius: a wrong unit, origin or direction.
+
+    Rods of the boundary may lie anywhere, as those of a chain that is pulled out of an opening.
+    """
     if walls.count == 0:
         return
+    free = True if tracks.boundary is None else ~tracks.boundary
+    margin = np.where(free, tracks.radius, np.inf)[:, None]
     found: dict[int, tuple[int, int, float]] = {}  # of every wall the first frame and row, and how far beyond [m]
     for k in range(tracks.frame_count):  # one by one: the distances from all walls in all frames take much memory
         beyond = -bounding_distance(walls.endpoints[k], walls.sides, tracks.position[k])[0]
-        for row, w in np.argwhere(beyond > tracks.radius[:, None]).tolist():  # NaN of lost grains compares false
+        for row, w in np.argwhere(beyond > margin).tolist():  # NaN of lost grains compares false
             found.setdefault(w, (k, row, float(beyond[row, w])))
     if not found:
         return

@@ -99,7 +99,7 @@ def measure_motion_information(
     gap_error = _beyond_noise(strong.gap, strong, noise)
     return MotionInformation(
         noise, motion_scale(motion, noise), sliding, signal, gap_error, 2.0 * float(grains.radius.mean()),
-        _count_beyond(packing.walls_of(snapshot), snapshot, contacts), soft,
+        _count_beyond(packing.walls_of(snapshot), snapshot, contacts, grains.free), soft,
         _beyond_noise(_without_overlap(strong), strong, noise) if soft else gap_error,
         undetermined_fraction(contacts, fn, snapshot.present & grains.free),
     )  # fmt: skip
@@ -189,8 +189,8 @@ def _beyond_noise(gap: Array, strong: _StrongGaps, noise: float) -> float:
     return float(np.sqrt(max(variance - expected, 0.0)))
 
 
-def _count_beyond(walls: Walls, snapshot: Snapshot, contacts: Contacts) -> int:
-    """Number of grains of the packing whose centre is beyond a wall beside which they are.
+def _count_beyond(walls: Walls, snapshot: Snapshot, contacts: Contacts, free: NDArray[np.bool_]) -> int:
+    """Number of free grains of the packing whose centre is beyond a wall beside which they are.
 
     Grains beyond a wall that no chain of pairs connects with those inside lie beside the apparatus.
     """
@@ -198,7 +198,7 @@ def _count_beyond(walls: Walls, snapshot: Snapshot, contacts: Contacts) -> int:
     out = np.einsum("nwk,wk->nw", offset, walls.outward)
     along = np.einsum("nwk,wk->nw", offset, walls.direction)
     beside: NDArray[np.bool_] = (along > 0.0) & (along < walls.length[None, :])
-    past = beside & (out > 0.0) & snapshot.present[:, None]
+    past = beside & (out > 0.0) & (snapshot.present & free)[:, None]
     if not past.any():
         return 0
     beyond = (past & ~behind_body(walls.endpoints, walls.side, snapshot.position)).any(axis=1)

@@ -20,6 +20,7 @@ CORNERS = 72  # of the polygon that draws a circle
 # from the second on it can touch nothing else.
 NEAR_END, ACROSS = 0.01, 0.05
 ALIKE = 0.9  # cosine of the greatest angle of two walls that face the same way
+DEEPEST = 0.4  # radii: a rod that overlaps a wall by more stands where the wall is not, as beside a plate's end
 Sides = NDArray[np.int8] | None
 
 
@@ -216,7 +217,7 @@ def bounding_distance(endpoints: Array, side: Sides, point: Array) -> tuple[Arra
     A bar ends: what is past its end and beyond its line may be inside the packing, as rods are beside a footing, in
     the other half of a box that is split, or in a pit between two floors. It is outside only if it is not in front of
     the wall that is nearest, and beyond another wall, too, or farther beyond than the bar is long. Nor does one face of
-    a body in the packing, as of a pile, bound what is in front of its opposite face.
+    a body in the packing, as of a pile or a wedge, bound what is in front of another face.
 
     Parameters
     ----------
@@ -244,11 +245,14 @@ def bounding_distance(endpoints: Array, side: Sides, point: Array) -> tuple[Arra
     length = np.linalg.norm(endpoints[..., 1, :] - endpoints[..., 0, :], axis=-1)
     inside = in_front | (alone & (distance > -length))
     free = past & inside & (distance < 0.0)
-    return np.where(free | _in_front_of_opposite(distance, normal, ~past & _straight(side)), np.inf, distance), normal
+    return np.where(free | _in_front_of_another(endpoints, side, point, distance, normal), np.inf, distance), normal
 
 
 def behind_body(endpoints: Array, side: Sides, point: Array) -> NDArray[np.bool_]:
-    """Return whether points are beyond walls, but in front of the opposite face of the same body.
+    """Return whether points are beyond walls, but in front of another face of the same body.
+
+    The way from such a point to its foot on the wall crosses that face from the front: of a pile the opposite one, of
+    a wedge its other flank.
 
     Parameters
     ----------
@@ -265,9 +269,7 @@ def behind_body(endpoints: Array, side: Sides, point: Array) -> NDArray[np.bool_
         False for circles.
     """
     place = point[..., None, :]
-    distance, normal = wall_distance(endpoints, side, place)
-    beside = beside_wall(endpoints, side, place, np.zeros(distance.shape)) & _straight(side)
-    return _in_front_of_opposite(distance, normal, beside)
+    return _in_front_of_another(endpoints, side, point, *wall_distance(endpoints, side, place))
 
 
 def _straight(side: Sides) -> NDArray[np.bool_]:
@@ -275,13 +277,22 @@ def _straight(side: Sides) -> NDArray[np.bool_]:
     return np.ones(1, np.bool_) if side is None else side == STRAIGHT
 
 
-def _in_front_of_opposite(distance: Array, normal: Array, beside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """As `behind_body`, by distances (…, w) and outward normals, of straight walls that points project onto."""
+def _in_front_of_another(endpoints: Array, side: Sides, point: Array, distance: Array, normal: Array) -> Array:
+    """As `behind_body`, with the distances (…, w) and outward normals (…, w, 2) of the points (…, 2)."""
     if not (distance < 0.0).any():
         return np.zeros(distance.shape, np.bool_)
-    opposite = np.einsum("...wk,...vk->...wv", normal, normal) < -ALIKE
-    between = (distance >= 0.0)[..., None, :] & (distance[..., None, :] < -distance[..., :, None])
-    return (opposite & between & beside[..., None, :]).any(axis=-1) & beside
+    straight = _straight(side)
+    beyond = beside_wall(endpoints, side, point[..., None, :], np.zeros(distance.shape)) & straight & (distance < 0.0)
+    foot = distance[..., None] * normal  # from the point, on every wall w
+    # Where the way from the point to its foot on wall w crosses wall v.
+    left = distance[..., None, :] - np.einsum("...wk,...vk->...wv", foot, normal)
+    crosses = (distance >= 0.0)[..., None, :] & (left < 0.0) & straight
+    covered = np.where(crosses, distance[..., None, :] / np.where(crosses, distance[..., None, :] - left, 1.0), 0.0)
+    along = np.stack([-normal[..., 1], normal[..., 0]], axis=-1)
+    start = np.einsum("...vk,...vk->...v", point[..., None, :] - endpoints[..., 0, :], along)
+    where = start[..., None, :] + covered * np.einsum("...wk,...vk->...wv", foot, along)
+    length = np.linalg.norm(endpoints[..., 1, :] - endpoints[..., 0, :], axis=-1)[..., None, :]
+    return beyond & (crosses & (where >= 0.0) & (where <= length)).any(axis=-1)
 
 
 def wall_displacement(former: Array, later: Array, side: Sides, at: Array | None = None) -> Array:

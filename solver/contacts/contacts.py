@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..bodies.cell import Cell
 from ..bodies.disc_pairs import find_disc_pairs
 from ..bodies.grains import Array, Grains
-from ..bodies.wall_shapes import Sides, distance_from_walls, faces_walls
+from ..bodies.wall_shapes import DEEPEST, Sides, distance_from_walls, faces_walls
 from ..bodies.walls import Walls
 from ..quantity import Quantity
 from .pairs import Keys, make_keys, split_keys
@@ -205,7 +205,7 @@ def _wall_pairs(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Find pairs of grain and wall; the grain faces it, a straight one for a radius past its ends, or is at an end."""
     gap = distance_from_walls(walls.endpoints[None], _row(walls.side), position[:, None]) - radius[:, None]
-    near = (gap < threshold) & (gap > -radius[:, None]) & present[:, None]
+    near = (gap < threshold) & (gap > -DEEPEST * radius[:, None]) & present[:, None]
     i, w = np.nonzero(near)
     faces = faces_walls(walls.endpoints, walls.side, w, position[i], radius[i])
     if not faces.all():

@@ -40,13 +40,18 @@ class Surroundings:
         endpoints: Array,
         noise: float,
         side: Sides = None,
+        free: NDArray[np.bool_] | None = None,
     ) -> None:
-        """radius (n,), position (f, n, 2), endpoints (f, w, 2, 2) and noise in metres; present (f, n); side (w,)."""
+        """radius (n,), position (f, n, 2), endpoints (f, w, 2, 2) and noise in metres; present (f, n); side (w,).
+
+        free (n,): grains whose motion is not imposed; None: all.
+        """
         self.radius, self.position, self.present, self.noise = radius, position, present, noise
         self._widest = float(radius.max())
         self._rows = [np.flatnonzero(here) for here in present]
         self._tree = [KDTree(position[k][rows]) for k, rows in enumerate(self._rows)]
         self._depth: dict[int, Array] = {}  # of grains (n, w) [m] from walls in a photograph
+        self._free = np.ones(len(radius), np.bool_) if free is None else free
         self._walls, self._side = endpoints, all_sides(side, endpoints.shape[1])
 
     @property
@@ -189,6 +194,12 @@ class Surroundings:
         if covariance[2, 2] > UNCERTAIN_SIZE**2:
             return size, 0.0
         return size + float(covariance[2] @ design.T @ gap[touches]), 1.0 / float(covariance[2, 2])
+
+    def count_free(self, position: Array, size: float, within: tuple[float, float]) -> float:
+        """Mean number of free grains that touch a rod; arguments as of `count_rearranged`."""
+        gap = np.linalg.norm(self.position - position[:, None], axis=2) - self.radius - size
+        touching = self.present & self._free & (gap > -within[0]) & (gap < within[1])
+        return float(touching.sum(axis=1).mean())
 
     def count_rearranged(self, position: Array, size: float, within: tuple[float, float], least: float) -> int:
         """Count contacts beyond two of a rod in photographs between which the bodies that touch it rearrange.

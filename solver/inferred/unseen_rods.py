@@ -42,6 +42,7 @@ STARTS = 4  # photographs in which places are searched, evenly spaced
 SIZE_MISFIT, MOVED_APART = 1.9, 2.0
 BEYOND_SIZES = 0.02  # by which an unseen rod of unknown size may be smaller or larger than all others
 LEAST_FOLLOWED = 0.25  # mean number of further contacts from which on the unknown size of a rod is fitted
+LEAST_FREE = 0.5  # mean number of free grains that touch a rod: between walls and boundary alone it holds nothing
 PASSES = 6  # each with the rods of the one before
 FEWEST_FRAMES, FEWEST_GRAINS = 3, 8
 
@@ -53,6 +54,7 @@ class UnseenRodSettings:
     noise: float  # [m] standard deviation of a position component
     sizes: Array | None = None  # (q,) [m] radii of the rods; None: any
     overlap: float = 0.0  # [m] mean overlap of touching grains where they are soft
+    boundary: NDArray[np.bool_] | None = None  # (n,) grains whose motion is imposed; None: none
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +141,9 @@ def infer_unseen(
     if sought:
         near: Array | None = None
         for _ in range(PASSES):
-            around = Surroundings(*_with(radius, position, present, rods), endpoints, noise, side)
+            free = np.ones(len(radius) + len(rods), np.bool_)
+            free[: len(radius)] = True if settings.boundary is None else ~settings.boundary
+            around = Surroundings(*_with(radius, position, present, rods), endpoints, noise, side, free)
             if known is None:
                 proposed = _propose_of_any_size(around, limits, near, tolerance)
             else:
@@ -282,6 +286,7 @@ def _select_supported(around: Surroundings, proposed: list[_Rod], tolerance: _To
     fit = [
         each for each in proposed
         if each.held >= least and each.overlapping <= TOLERATED
+        and around.count_free(each.position, each.radius, (tolerance.deep, tolerance.apart)) >= LEAST_FREE
         and (each.held >= FIRMLY_HELD or _is_held_anew(around, each, tolerance))
         and _gap_misfit(around, each, tolerance) <= GAP_MISFIT * np.sqrt(2.0) * around.noise
     ]  # fmt: skip

@@ -32,7 +32,12 @@ def add_unseen(tracks: Tracks, walls: WallTracks, sizes: Array | None, overlap: 
     present = tracks.present
     noise = float(np.sqrt(np.mean(tracks.position_sigma**2)))
     found = infer_unseen(
-        tracks.radius, tracks.position, present, walls.endpoints, UnseenRodSettings(noise, sizes, overlap), walls.side
+        tracks.radius,
+        tracks.position,
+        present,
+        walls.endpoints,
+        UnseenRodSettings(noise, sizes, overlap, tracks.boundary),
+        walls.side,
     )
     if not found.sought:
         return tracks

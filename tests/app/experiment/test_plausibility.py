@@ -90,6 +90,16 @@ def test_rods_in_the_other_half_of_a_split_box_are_not_beyond_its_side() -> None
         check_inside(SOURCES, tracks_at(np.array([[0.19, 0.05], [0.22, 0.05]])), walls)
 
 
+def test_rods_of_the_boundary_may_lie_beyond_walls() -> None:
+    """As those of a chain that is pulled out of an opening."""
+    halves = np.array([[[[0.2, 0.0], [0.2, 0.1]], [[0.2, 0.12], [0.2, 0.2]]]])
+    walls = WallTracks(("low", "high"), halves, np.full(2, np.nan))
+    tracks = tracks_at(np.array([[0.19, 0.05], [0.22, 0.05]]))
+    check_inside(SOURCES, replace(tracks, boundary=np.array([False, True])), walls)
+    with pytest.raises(InputError, match="grain 1 lies 20 mm beyond it"):
+        check_inside(SOURCES, replace(tracks, boundary=np.array([True, False])), walls)
+
+
 def test_one_wrong_place_of_a_later_photograph_is_not_blamed_on_the_walls() -> None:
     corners = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]])
     ends = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)  # the same upside down

@@ -51,9 +51,9 @@ MUTANTS = [
         ("(alone & (distance > -length))", "alone"),
         ("np.where(past, from_ends, np.abs(distance)).argmin", "np.abs(distance).argmin"),
         ("(~past & (distance >= 0.0), nearest", "(~past, nearest"),
-        ("(distance[..., None, :] < -distance[..., :, None])", "True"),
-        ("& beside[..., None, :]).any(axis=-1) & beside", ").any(axis=-1) & beside"),
-        ("normal, normal) < -ALIKE", "normal, normal) < ALIKE"),
+        ("& (left < 0.0) & straight", "& straight"),
+        ("(crosses & (where >= 0.0) & (where <= length))", "crosses"),
+        ("return beyond & (crosses", "return (crosses"),
     ),
     *mutants_of(
         "solver/inferred/surroundings.py",
@@ -70,6 +70,7 @@ MUTANTS = [
     *mutants_of(
         "solver/inferred/unseen_rods.py",
         "tests/solver/inferred/test_unseen_rods.py",
+        ("True if settings.boundary is None else ~settings.boundary", "True"),
         ("anew >= LEAST_REARRANGED and misfit <= SIZE_MISFIT", "misfit <= SIZE_MISFIT"),
         (
             "anew >= LEAST_REARRANGED and misfit <= SIZE_MISFIT * np.sqrt(2.0) * around.noise",

@@ -10,6 +10,7 @@ MUTANTS = [
         "tests/solver/bodies/test_wall_shapes.py",
         ("np.where(ends.touched, ends.distance, distance)", "distance"),
         ("faces |= ends.touched & ", "faces |= False & "),
+        ("(gap > -DEEPEST * radius[:, None])", "(gap > -radius[:, None])"),
     ),
     *mutants_of(
         "solver/contacts/contacts.py",

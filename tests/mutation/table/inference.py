@@ -278,7 +278,7 @@ MUTANTS = [
         ("tracks.id.max() + 1 + np.arange(u)", "np.arange(u)"),
         ("TrackStatus.INFERRED, TrackStatus.LOST", "TrackStatus.LOST, TrackStatus.INFERRED"),
         (">= tracks.grain_count)", "< tracks.grain_count)"),
-        ("UnseenRodSettings(noise, sizes, overlap)", "UnseenRodSettings(noise, None, overlap)"),
+        ("UnseenRodSettings(noise, sizes, overlap, tracks.boundary)", "UnseenRodSettings(noise, None, overlap)"),
     ),
     *mutants_of(
         "app/inference/correction/radii.py",

@@ -141,6 +141,9 @@ def test_only_grains_beside_a_wall_can_be_beyond_it(lattice):
     position[1] = right + RADIUS, top + RADIUS  # beyond the corner, beside no wall
     moved = packing, replace(snapshot, position=position), walls, contacts
     assert measure(moved, rolling(snapshot, 0.0)).beyond == 1
+    imposed = replace(packing.grains, boundary=np.arange(packing.grains.count) == 0)
+    moved = replace(packing, grains=imposed), *moved[1:]
+    assert measure(moved, rolling(snapshot, 0.0)).beyond == 0
     assert measure(lattice, rolling(snapshot, 0.0)).beyond == 0
 
 

@@ -285,6 +285,27 @@ def test_a_face_of_a_body_does_not_bound_what_is_in_front_of_its_opposite_face()
     assert distance[4, 1] == pytest.approx(-0.005)  # outside of the box
 
 
+@pytest.mark.parametrize("place", [(0.2034, 0.0991), (0.15, 0.0955)])
+def test_a_wall_deep_inside_a_rod_is_no_contact(place) -> None:
+    """A rod that has risen beside the end of a plate, and one half beyond its face: the wall is not there."""
+    plate = Walls.at_rest(np.array([[[0.2, 0.1], [0.1, 0.1]]]), np.array([50.0]))
+    assert detect_contacts(rods(0.01), np.array([place]), np.ones(1, bool), plate, 2e-4).count == 0
+    higher = Walls.at_rest(plate.endpoints + np.array([0.0, 0.004]))
+    assert detect_contacts(rods(0.01), np.array([[0.15, 0.0955]]), np.ones(1, bool), higher, 2e-4).count == 1
+
+
+def test_one_flank_of_a_wedge_does_not_bound_what_is_in_front_of_the_other() -> None:
+    tip, left, right = [0.14, 0.08], [0.08, 0.16], [0.2, 0.16]
+    walls = np.array([[[0.0, 0.0], [0.3, 0.0]], [tip, left], [right, tip]])
+    place = np.array([[0.1, 0.12], [0.18, 0.12], [0.13, 0.05], [0.14, 0.15], [0.1, -0.01]])
+    behind = behind_body(walls, None, place)
+    assert behind.tolist() == [[False, False, True], [False, True, False], *[[False] * 3] * 3]
+    distance, _ = bounding_distance(walls, None, place)
+    assert (distance[:3] > 0.0).all()
+    assert (distance[3, 1:] < 0.0).all()  # inside the wedge
+    assert distance[4, 0] == pytest.approx(-0.01)  # below the floor
+
+
 def test_floors_of_different_heights_bound_what_is_in_front_of_them() -> None:
     corners = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, -0.03], [0.2, -0.03], [0.2, 0.0], [0.3, 0.0]])
     pit = np.stack([corners[:-1], corners[1:]], axis=1)  # left floor, step, floor of the pit, step, right floor

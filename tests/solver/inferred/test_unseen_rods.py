@@ -98,11 +98,12 @@ def ring(
     *,
     known: bool = True,
     wandering: float = 0.0,
+    free: bool = True,
 ) -> UnseenRods:
     """Infer rods inside a ring of six around a hole of their size, one of which moves inward after two frames.
 
     touching: of the six, the others are too far out; turning [rad], moving (along the ring, of a radius): per frame;
-    known: their size; wandering [m]: of those that touch, outward and inward in turn.
+    known: their size; wandering [m]: of those that touch, outward and inward in turn; free: not of the boundary.
     """
     r = 8e-3
     angle = np.pi / 3 * np.array([0, 2, 4, 1, 3, 5])
@@ -121,7 +122,7 @@ def ring(
     walls = np.tile(np.stack([side, np.roll(side, -1, axis=0)], axis=1), (frames, 1, 1, 1))
     return infer_unseen(
         np.full(10, r), position, np.ones((frames, 10), bool), walls,
-        UnseenRodSettings(NOISE, np.array([r]) if known else None),
+        UnseenRodSettings(NOISE, np.array([r]) if known else None, boundary=np.full(10, not free)),
     )  # fmt: skip
 
 
@@ -217,3 +218,16 @@ def test_only_walls_that_bound_a_place_are_around_it() -> None:
     for x, expected in ((0.203, [-0.008]), (0.19, [0.0, 0.005])):  # in the shifted half, and before both
         place = np.array([x, 0.15])
         assert gaps(around.bodies(place, 0, 0.01), place, 0.01) == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_rod_that_only_walls_and_the_boundary_hold_is_none() -> None:
+    """Boundary rods, as those of a chain that leaves the packing, and walls hold it: no force inside needs it."""
+    place = np.zeros((2, 2))
+    neighbours = np.repeat(np.array([[[0.02, 0.0], [-0.02, 0.0], [0.0, 0.0202]]]), 2, axis=0)
+    around, n = box(neighbours), 3
+    assert around.count_free(place, 0.01, (1e-5, 1e-5)) == 2.0
+    given = around.radius, neighbours, np.ones((2, n), bool), np.zeros((2, 0, 2, 2)), NOISE, None
+    assert Surroundings(*given, np.array([True, False, True])).count_free(place, 0.01, (1e-5, 1e-5)) == 1.0
+    assert Surroundings(*given, np.zeros(n, bool)).count_free(place, 0.01, (1e-5, 1e-5)) == 0.0
+    assert ring(closing=0.0).count == 1
+    assert ring(closing=0.0, free=False).count == 0
