@@ -9,15 +9,16 @@ import numpy as np
 
 from ..frame_forces import FrameStatus
 from .evidence import Evidence
+from .expected_correlation import fraction_seen
 from .fitted import FITTED
 from .trust import MAX_UNSEEN_FRACTION, motion_assessment
 
 SUSPECT_CORRECTION = 0.25  # ε beyond which the forces contradict the motion
 MOSTLY_POSITIONS = 0.6  # weight of the position-only estimate above which ε no longer makes a frame suspect
 SUSPECT_PRESSURE_JUMP = 0.15  # |Δp| / p between frames
-# T from which neither ε nor a jump makes a frame suspect whose forces are in balance: r is then below .87 in one frame
+# T from which neither ε nor a jump makes a frame suspect whose forces are in balance: r is then below .82 in one frame
 # of twenty at most, so that these two are sudden motion and sudden stress, and no contradiction.
-RELIABLE = 0.9
+RELIABLE = 0.85
 IN_BALANCE = 0.01  # worst |ΣF| of a grain over the mean f_n: below it where friction and contacts can hold it
 UNBALANCED = 0.05  # worst |ΣF| of a grain over the mean f_n: .1 to 10 in faulty fields
 CHAIN_UNBALANCED = 0.15  # the same for a single chain, which gives the motion some weight: up to .07 in sound ones
@@ -135,7 +136,9 @@ def find_faults(evidence: Evidence) -> list[str]:
         )
     if motion_assessment(evidence).trust >= RELIABLE and evidence.unbalance < IN_BALANCE:
         return faults
-    if evidence.correction > SUSPECT_CORRECTION and evidence.position_weight < MOSTLY_POSITIONS:
+    # Where nothing slides the motion is noise, which any forces must correct.
+    seen_correction = evidence.correction * fraction_seen(evidence)
+    if seen_correction > SUSPECT_CORRECTION and evidence.position_weight < MOSTLY_POSITIONS:
         faults.append(
             f"the forces must correct the measured motion by ε = {evidence.correction:.2f} (> {SUSPECT_CORRECTION}): "
             "a strong contact is probably missing, friction too low or the motion wrong"

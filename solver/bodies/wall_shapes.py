@@ -277,7 +277,9 @@ def _straight(side: Sides) -> NDArray[np.bool_]:
     return np.ones(1, np.bool_) if side is None else side == STRAIGHT
 
 
-def _in_front_of_another(endpoints: Array, side: Sides, point: Array, distance: Array, normal: Array) -> Array:
+def _in_front_of_another(
+    endpoints: Array, side: Sides, point: Array, distance: Array, normal: Array
+) -> NDArray[np.bool_]:
     """As `behind_body`, with the distances (…, w) and outward normals (…, w, 2) of the points (…, 2)."""
     if not (distance < 0.0).any():
         return np.zeros(distance.shape, np.bool_)

@@ -49,6 +49,7 @@ MUTANTS = [
         ("trust >= RELIABLE and", "trust >= 2.0 and"),
         ("trust >= RELIABLE and", "trust >= 0.0 and"),
         (" and evidence.unbalance < IN_BALANCE:", ":"),
+        ("evidence.correction * fraction_seen(evidence)", "evidence.correction"),
         ("if evidence.holes and not evidence.sought:", "if evidence.holes:"),
         ("LOAD_FRACTIONS = (0.62, 2.5)", "LOAD_FRACTIONS = (0.062, 25.0)"),
         ("** 1.5, 0.4, 4.0))", "** 1.0, 0.4, 4.0))"),

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from rodsight.solver.assessment.evidence import Evidence
 from rodsight.solver.assessment.intervals.formula_sd import normal_sd, tangential_sd
+from rodsight.solver.assessment.motion_information import NO_INFORMATION
 from rodsight.solver.assessment.penalties import describe_penalties
 from rodsight.solver.assessment.status import (
     CHAIN_UNBALANCED,
@@ -53,8 +54,8 @@ def test_sound_evidence_is_settled_and_trusted():
         ({"unbalance": 1.01 * CHAIN_UNBALANCED, "disagreement": math.nan}, "out of balance"),
         ({"load_fraction": 0.99 * LOAD_FRACTIONS[0]}, "load"),
         ({"load_fraction": 1.01 * LOAD_FRACTIONS[1]}, "load"),
-        ({"correction": 1.01 * SUSPECT_CORRECTION}, "ε"),
-        ({"pressure_jump": 1.01 * SUSPECT_PRESSURE_JUMP, "disagreement": 0.4}, "jumped"),
+        ({"correction": 1.01 * SUSPECT_CORRECTION, "agreement": 0.4}, "ε"),
+        ({"pressure_jump": 1.01 * SUSPECT_PRESSURE_JUMP, "agreement": 0.4, "disagreement": 0.5}, "jumped"),
         ({"unseen_fraction": 1.01 * MAX_UNSEEN_FRACTION}, "unreadable"),
     ],
 )
@@ -72,9 +73,16 @@ def test_sudden_motion_or_stress_is_no_contradiction_where_the_forces_are_reliab
     assert trust(evident) > RELIABLE
     assert not is_suspect(evident)
     assert is_suspect(replace(evident, unbalance=0.02))  # no forces in balance are near what is measured
-    disagreeing = replace(evident, disagreement=0.4, agreement=0.6)
+    disagreeing = replace(evident, disagreement=0.4, agreement=0.4, overlap_agreement=0.4)
     assert trust(disagreeing) < RELIABLE
     assert is_suspect(disagreeing)
+
+
+def test_a_correction_of_noise_contradicts_nothing():
+    moving = replace(SOUND, correction=2.0, agreement=0.4)
+    assert is_suspect(moving)
+    resting = replace(moving, information=replace(NO_INFORMATION, slide_signal=0.05))
+    assert not is_suspect(resting)
 
 
 def test_all_faults_are_reported_together():
