@@ -4,9 +4,11 @@ import math
 from dataclasses import replace
 
 import pytest
+from rodsight.solver.assessment import expected_correlation
 from rodsight.solver.assessment.expected_correlation import (
     CONTRADICTED,
     MEASURES,
+    UNLOADED_GAIN,
     WIDEST,
     bound_correlation,
     closed_overlap,
@@ -144,13 +146,15 @@ def test_agreement_without_sliding_is_no_evidence():
     )
 
 
-def test_a_correction_at_rest_is_noise_unless_it_is_greater():
-    moving, still = (
-        replace(BOTH, information=replace(BOTH.information, slide_signal=each)) for each in (2.0, 0.0)
+def test_a_correction_counts_as_far_as_sliding_is_seen():
+    moving, half, still = (
+        replace(BOTH, information=replace(BOTH.information, slide_signal=each)) for each in (2.0, 0.5, 0.0)
     )  # fmt: skip
     assert unexplained_correction(replace(moving, correction=0.8)) == pytest.approx(0.8)
     assert unexplained_correction(replace(still, correction=0.8)) == pytest.approx(0.0)
-    assert unexplained_correction(replace(still, correction=5.0)) == pytest.approx(5.0 - 1.2)
+    assert unexplained_correction(replace(still, correction=5.0)) == pytest.approx(0.0)
+    assert unexplained_correction(replace(half, correction=0.8)) == pytest.approx(0.8 - 0.6)
+    assert unexplained_correction(replace(half, correction=5.0)) == pytest.approx(2.5)
     assert math.isnan(unexplained_correction(replace(still, correction=math.nan)))
     assert expect_correlation(replace(still, correction=0.8)) == expect_correlation(replace(still, correction=0.2))
 
@@ -182,13 +186,27 @@ WELL_KNOWN = replace(
     ],
     ids=["balance leaves more open", "more noise", "few rods inside"],
 )
-def test_without_a_load_what_shows_little_lowers_the_trust(little):
+def test_without_a_load_what_shows_little_lowers_the_trust(little, monkeypatch):
     """A packing whose outermost rods stand for its walls has the evidence of others, and less accurate forces."""
+    monkeypatch.setattr(expected_correlation, "UNLOADED_GAIN", 9.0)
     well, little_known = (replace(each, loaded=False) for each in (WELL_KNOWN, little))
     assert bound_correlation(little_known) < bound_correlation(well)
     assert predict_correlation([little_known]) < predict_correlation([well])
     assert bound_correlation(little) == bound_correlation(WELL_KNOWN)
     assert predict_correlation([little]) == predict_correlation([WELL_KNOWN])
+
+
+def test_a_load_that_is_not_known_is_no_evidence(monkeypatch):
+    contradicted = replace(WELL_KNOWN, correction=0.9, power_gap=0.8, unbalance=0.1)
+    unloaded = replace(contradicted, loaded=False)
+    for measure in (bound_correlation, expect_correlation):
+        limited = measure(unloaded)
+        assert math.atanh(limited) == pytest.approx(math.atanh(measure(contradicted)) + UNLOADED_GAIN)
+    reasons = losses(unloaded)
+    assert reasons == losses(contradicted)
+    monkeypatch.setattr(expected_correlation, "UNLOADED_GAIN", 9.0)
+    assert bound_correlation(unloaded) > limited - 0.1
+    assert losses(unloaded) != reasons
 
 
 def test_one_photograph_without_a_load_makes_a_prediction_without_one():
