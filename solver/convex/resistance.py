@@ -21,6 +21,7 @@ from .program import weigh_rows
 from .sliding_model import Parameter, ResistedFrame, SlidingModel, compare_models, power_gap
 
 REVERSED = 0.5  # gap of the reversed motion over that of the given one, below which it is named
+ABSURD = 1.0  # friction of no rods: the motion reversed is then the better explanation, however large a gap it leaves
 AHEAD = 0.85  # gap of the winner over that of the second
 FRAMES = 4  # consecutive photographs on which models are compared
 FEWEST = 2  # of these
@@ -70,16 +71,19 @@ def find_resistance(frames: Sequence[ResistedFrame], given: SlidingModel, worker
     Returns
     -------
     Resistance or None
-        None where nothing slides. A rival is named if its parameters are determined, its gap is below .62 times that of
-        the given model and of another friction alone, .85 times that of every other rival, and below .25. Where none of
-        these wins, a resistance to rolling is named that leaves less than .8 of the gap of both.
+        None where nothing slides. The reversed motion is named if its gap is below half of that of the given one, and
+        below .25, or no rival with a friction below 1 explains the sliding. Another rival is named if its parameters
+        are determined, its gap is below .62 times that of the given model and of another friction alone, .85 times that
+        of every other rival, and below .25. Where none of these wins, a resistance to rolling is named that leaves less
+        than .8 of the gap of both.
     """
     before = power_gap(frames, given)
     if not np.isfinite(before):
         return None
     nothing = Resistance("", given, before, given, before)
     turned = power_gap([each.reversed() for each in frames], given)
-    if turned < min(REVERSED * before, before - LEAST_GAP, MOST_GAP):
+    backward = turned < min(REVERSED * before, before - LEAST_GAP)
+    if backward and turned < MOST_GAP:
         return Resistance("photographs_reversed", given, before, given, turned)
     walls = float(np.mean([each.contacts.with_wall.sum() for each in frames]))
     names = [name for name in RIVALS if name != "wall_friction" or walls >= LEAST_WALLS]
@@ -87,6 +91,10 @@ def find_resistance(frames: Sequence[ResistedFrame], given: SlidingModel, worker
     sound = {name: each for name, each in fitted.items() if each.enclosed}
     if "friction" in sound and sound["friction"].model.friction > MOST_FRICTION * given.friction:
         del sound["friction"]
+    if backward and all(
+        each.model.friction > ABSURD for name, each in sound.items() if is_clearly_less(each.gap, before)
+    ):
+        return Resistance("photographs_reversed", given, before, given, turned)
     friction = sound["friction"].gap if "friction" in sound else before
     best = min((name for name in sound if name != "friction"), key=lambda name: sound[name].gap, default="")
     if best and is_clearly_less(sound[best].gap, min(before, friction)):

@@ -16,9 +16,9 @@ from .data_quality import FEW_SLIDING, measure_data_quality
 
 # Fraction of the contacts that slide beyond noise, from which on causes are named that act where they slide.
 LEAST_SLIDING = dict.fromkeys(("friction", "wall_friction", "adhesion"), FEW_SLIDING) | {
-    # The wrong sense of all sliding shows with fewer: at .06 to .1 it lowered what contradicts the sliding to .2 to .5,
+    # The wrong sense of all sliding shows with fewer: at .03 to .1 it lowered what contradicts the sliding to .2 to .5,
     # and was the best explanation of correct input only where at most .01 slide.
-    "photographs_reversed": 0.05,
+    "photographs_reversed": 0.02,
 }
 LEAST_NAMED = 0.005  # of the mean force: a lesser drag or attraction explains nothing, whatever else was fitted with it
 

@@ -135,8 +135,10 @@ MUTANTS = [
     *mutants_of(
         "solver/convex/resistance.py",
         SLIDING,
-        ("if turned < min(REVERSED * before, before - LEAST_GAP, MOST_GAP):", "if turned < MOST_GAP:"),
-        ("before - LEAST_GAP, MOST_GAP):", "MOST_GAP):"),
+        ("backward = turned < min(REVERSED * before, before - LEAST_GAP)", "backward = True"),
+        ("min(REVERSED * before, before - LEAST_GAP)", "REVERSED * before"),
+        ("each.model.friction > ABSURD for", "each.model.friction > 9.0 for"),
+        ("each.model.friction > ABSURD for", "each.model.friction > 0.0 for"),
         ('if name != "wall_friction" or walls >= LEAST_WALLS', "if True"),
         ('if best == "wall_friction" and walls_fit else best', "if False else best"),
         ("> MOST_FRICTION * given.friction:", "> 1e9 * given.friction:"),

@@ -314,7 +314,7 @@ MUTANTS = [
         ("if not sequence.packing.scale_is_known:", "if False:"),
         ("drag / sequence.base_gravity", "drag"),
         ("max(1, (len(snapshots) - FRAMES) // 2)", "0"),
-        ('"photographs_reversed": 0.05', '"photographs_reversed": 0.1'),
+        ('"photographs_reversed": 0.02', '"photographs_reversed": 0.1'),
     ),
     *mutants_of(
         "app/inference/diagnosis/trial.py",

@@ -345,6 +345,22 @@ def test_a_motion_that_fits_in_reverse_order_is_named_first(frames, monkeypatch)
     assert found.cause == "photographs_reversed"
 
 
+@pytest.mark.parametrize(("friction", "cause"), [(1.1, "photographs_reversed"), (0.6, "friction")])
+def test_no_rods_have_the_friction_that_a_reversed_motion_shows(frames, monkeypatch, friction, cause):
+    gaps = iter([0.6, 0.28])  # of the given motion, and of the reversed one: too much to be named by itself
+    monkeypatch.setattr(resistance, "power_gap", lambda *_: next(gaps))
+    rough = FittedModel(replace(GIVEN, friction=friction), 0.06, True)
+    none = FittedModel(GIVEN, 0.6, False)
+    monkeypatch.setattr(
+        resistance,
+        "compare_models",
+        lambda frames, given, rivals, workers: [rough if each == ("all_friction",) else none for each in rivals],
+    )
+    found = find_resistance(frames[2], replace(GIVEN, friction=0.4))
+    assert found is not None
+    assert found.cause == cause
+
+
 def test_a_gap_that_is_nothing_in_either_order_names_no_order(frames, monkeypatch):
     gaps = iter([0.004, 0.001])
     monkeypatch.setattr(resistance, "power_gap", lambda *_: next(gaps))

@@ -76,8 +76,8 @@ def test_what_acts_where_contacts_slide_is_named_only_where_enough_do(sequence, 
 
 
 def test_a_reversed_order_is_named_where_fewer_contacts_slide(sequence, monkeypatch) -> None:
-    assert examine(sequence, monkeypatch, "photographs_reversed", 0.04) == []
-    assert len(examine(sequence, monkeypatch, "photographs_reversed", 0.06)) == 1
+    assert examine(sequence, monkeypatch, "photographs_reversed", 0.015) == []
+    assert len(examine(sequence, monkeypatch, "photographs_reversed", 0.03)) == 1
 
 
 def test_a_base_is_named_however_few_contacts_slide(sequence, monkeypatch) -> None:
