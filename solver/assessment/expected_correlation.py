@@ -167,9 +167,18 @@ def rests_on_overlaps(evidence: Evidence) -> bool:
 
 
 def losses(evidence: Evidence) -> dict[str, float]:
-    """By how much the bound would rise if one measure were as in the best eighth of the fit, for each known measure."""
-    if _is_limited(evidence):
-        evidence = replace(evidence, loaded=True)
+    """By how much the bound would rise if one measure were as in the best eighth of the fit, for each known measure.
+
+    Where the bound is what it would be under a load, the greater of what both tables show.
+    """
+    own = _losses(evidence)
+    if not _is_limited(evidence):
+        return own
+    loaded = _losses(replace(evidence, loaded=True))
+    return {name: max(own.get(name, 0.0), loaded.get(name, 0.0)) for name in {**own, **loaded}}
+
+
+def _losses(evidence: Evidence) -> dict[str, float]:
     table, score, shown = _table(evidence), correlation_score(evidence), _shown_fraction(evidence)
     known, seen = shown * _known_fraction(evidence), fraction_seen(evidence)
     best = {

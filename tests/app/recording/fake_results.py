@@ -109,7 +109,7 @@ def _shear(frame_count: int, columns: int, rows: int, rng: np.random.Generator) 
         ids, np.full(n, RADIUS), 30.0 * np.arange(f), position, rotation, np.full((f, n), 1e-5),
         np.full((f, n), 0.97), np.full((f, n), TrackStatus.OK, np.uint8),
     )  # fmt: skip
-    right, top = (columns - 0.5) * step + RADIUS * 0.02, (rows - 1) * step * np.sqrt(0.75) + 2.0 * RADIUS
+    right, top = (columns - 0.5) * step + 2.0 * RADIUS, (rows - 1) * step * np.sqrt(0.75) + 2.0 * RADIUS
     corner = np.array([[0.0, 0.0], [right, 0.0], [right, top], [0.0, top]])
     corners = np.repeat(corner[None], frame_count, axis=0)
     corners[:, :, 0] += np.tan(shear)[:, None] * corner[:, 1]

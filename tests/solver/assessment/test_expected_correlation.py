@@ -203,7 +203,8 @@ def test_a_load_that_is_not_known_is_no_evidence(monkeypatch):
         limited = measure(unloaded)
         assert math.atanh(limited) == pytest.approx(math.atanh(measure(contradicted)) + UNLOADED_GAIN)
     reasons = losses(unloaded)
-    assert reasons == losses(contradicted)
+    assert reasons.keys() > losses(contradicted).keys()
+    assert all(reasons[name] >= loss for name, loss in losses(contradicted).items())
     monkeypatch.setattr(expected_correlation, "UNLOADED_GAIN", 9.0)
     assert bound_correlation(unloaded) > limited - 0.1
     assert losses(unloaded) != reasons
