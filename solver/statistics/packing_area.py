@@ -13,6 +13,8 @@ from ..bodies.walls import Walls
 PARALLEL = np.radians(10.0)  # greatest angle between walls of one side, as the halves of a box that is split
 CORNERS = 2048  # of the polygon that approximates a circle
 FEWEST_AROUND = 4  # boundary rods around an opening
+MOST_BEYOND = 0.02  # fraction of the rods whose centres are beyond the line of a wall around all of them
+ROUNDING = 1e-9  # [m]
 WIDEST_PORE = 1.5  # distances of neighbouring boundary rods: radius of the circle through three rods around a pore
 
 
@@ -33,8 +35,9 @@ def packing_area(
     Parameters
     ----------
     walls
-        The area is that of the cell, or of the polygon bounded by the lines of the straight walls, in the order of
-        their directions. A circle around the packing is cut by these lines; the area of inner circles is subtracted.
+        The area is that of the cell, or of the polygon bounded by the lines of the straight walls around the rods, in
+        the order of their directions. A circle around the packing is cut by these lines; the area of inner circles is
+        subtracted.
     position : (n, 2)
         Centres [m], whose convex hull is used where the walls do not enclose an area.
     present : (n,) bool, optional
@@ -51,7 +54,16 @@ def packing_area(
     if len(around):
         narrowest = int(around[np.argmin(radius[around])])
         return _area_in_circle(walls, narrowest) - within
-    return _area_between_lines(walls, np.flatnonzero(~walls.curved), position) - within
+    return _area_between_lines(walls, _outer_walls(walls, position), position) - within
+
+
+def _outer_walls(walls: Walls, position: Array) -> NDArray[np.intp]:
+    """Straight walls that nearly all rods lie in front of; faces of a body in the packing, as of a wedge, are none."""
+    straight = np.flatnonzero(~walls.curved)
+    if not len(position):
+        return straight
+    depth = np.einsum("wk,nwk->nw", walls.outward[straight], walls.endpoints[straight, 0] - position[:, None])
+    return straight[(depth < -ROUNDING).mean(axis=0) <= MOST_BEYOND]
 
 
 def _area_of_openings(position: Array, boundary: NDArray[np.bool_] | None) -> float:

@@ -19,6 +19,8 @@ MUTANTS = [
         "tests/solver/statistics/test_packing_area.py",
         ("if (apart > PARALLEL).all():", "if (apart > 0.0).all():"),
         ("sides > 4.0 * WIDEST_PORE * apart * area", "sides > 0.0"),
+        ("(depth < -ROUNDING).mean(axis=0) <= MOST_BEYOND", "(depth < -ROUNDING).mean(axis=0) <= 2.0"),
+        ("(depth < -ROUNDING).mean(axis=0) <= MOST_BEYOND", "(depth < -ROUNDING).mean(axis=0) <= 0.0"),
         ("None if boundary is None else boundary[present]", "boundary"),
     ),
     *mutants_of(

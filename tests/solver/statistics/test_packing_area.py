@@ -22,7 +22,8 @@ def test_halves_of_a_side_are_one_side_of_the_area(turned):
     c = np.array([[0.0, 0.0], [0.5, 0.0], [0.5, 0.25], [0.51, 0.25], [0.51 + 0.35 * turned, 0.6], [0.0, 0.6]])
     ends = np.stack([c, np.roll(c, -1, axis=0)], axis=1)[[0, 1, 3, 4, 5]]  # the upper half is displaced
     walls = Walls(ends, np.zeros((5, 2, 2)), np.full(5, np.nan))
-    assert packing_area(walls, c) == pytest.approx(0.51 * 0.6, rel=1e-3)
+    inside = np.array([[0.2, 0.3], [0.3, 0.1], [0.3, 0.5]])
+    assert packing_area(walls, inside) == pytest.approx(0.51 * 0.6, rel=1e-3)
 
 
 def ring(radius: float, count: int) -> np.ndarray:
@@ -58,3 +59,16 @@ def test_pores_between_boundary_rods_count():
     lattice = np.array([[k + 0.5 * (row % 2), row * np.sqrt(0.75)] for row in range(6) for k in range(6)])
     everywhere = np.ones(len(lattice), bool)
     assert packing_area(NO_WALLS, lattice, None, everywhere) == pytest.approx(packing_area(NO_WALLS, lattice))
+
+
+def test_faces_of_a_body_in_the_packing_bound_no_area():
+    """The lines of a wedge's flanks would cut the box: rods are beyond both."""
+    box = np.array([[0.0, 0.0], [0.3, 0.0], [0.3, 0.2], [0.0, 0.2]])
+    sides = np.stack([box, np.roll(box, -1, axis=0)], axis=1)
+    flanks = np.array([[[0.15, 0.08], [0.1, 0.2]], [[0.2, 0.2], [0.15, 0.08]]])
+    walls = Walls.at_rest(np.concatenate([sides, flanks]))
+    grid = np.stack(np.meshgrid(np.arange(0.01, 0.3, 0.02), np.arange(0.01, 0.2, 0.02)), axis=-1).reshape(-1, 2)
+    assert packing_area(walls, grid) == pytest.approx(0.06)
+    assert packing_area(Walls.at_rest(sides), grid[:0]) == pytest.approx(0.06)
+    one = np.concatenate([grid, [[0.301, 0.1]]])  # a single rod beyond a side does not open the box
+    assert packing_area(walls, one) == pytest.approx(0.06)
