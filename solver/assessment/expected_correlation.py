@@ -103,7 +103,7 @@ def bound_correlation(evidence: Evidence) -> float:
     had read, and worse the others. Where the gap error x exceeds the greatest one x_0 that was fitted, nothing is known
     of r, and T is multiplied by x_0/x. Of soft grains T is at least the `confirmed_correlation`.
     """
-    bound = _bound(correlation_score(evidence), evidence) * _known_fraction(evidence) * _shown_fraction(evidence)
+    bound = _bound_by_table(evidence)
     return max(_as_with_a_load(bound, bound_correlation, evidence), confirmed_correlation(evidence))
 
 
@@ -205,7 +205,7 @@ def _as_with_a_load(found: float, measure: Callable[[Evidence], float], evidence
 
 def _is_limited(evidence: Evidence) -> bool:
     """Whether the trust is what it would be under a known load."""
-    alone = _bound(correlation_score(evidence), evidence) * _known_fraction(evidence) * _shown_fraction(evidence)
+    alone = _bound_by_table(evidence)
     return _as_with_a_load(alone, bound_correlation, evidence) < alone
 
 
@@ -219,6 +219,10 @@ def _known_fraction(evidence: Evidence) -> float:
 def _shown_fraction(evidence: Evidence) -> float:
     """Fraction of r that is left where gaps were closed that would show forces."""
     return CLOSED / (CLOSED + closed_overlap(evidence))
+
+
+def _bound_by_table(evidence: Evidence) -> float:
+    return _bound(correlation_score(evidence), evidence) * _known_fraction(evidence) * _shown_fraction(evidence)
 
 
 def _bound(score: float, evidence: Evidence) -> float:

@@ -275,13 +275,13 @@ def _boundary(evidence: Evidence) -> Penalty | None:
 
 
 def _missing_force(evidence: Evidence) -> Penalty | None:
-    """What is left of r if only the forces were missing that would hold the grains: 1/√(1 + x), x their share."""
-    share = evidence.missing_force
+    """What is left of r if only the forces were missing that would hold the grains: 1/√(1 + x), x their fraction."""
+    missing = evidence.missing_force
     words = (
-        f"grains that nothing holds lack forces of {100.0 * math.sqrt(share):.0f} % of all others (rms): find the "
+        f"grains that nothing holds lack forces of {100.0 * math.sqrt(missing):.0f} % of all others (rms): find the "
         "contact, the wall or the rod that holds them"
     )
-    return Penalty(1.0 - 1.0 / math.sqrt(1.0 + share), words) if share > 0.0 else None
+    return Penalty(1.0 - 1.0 / math.sqrt(1.0 + missing), words) if missing > 0.0 else None
 
 
 def _softness(evidence: Evidence) -> Penalty | None:

@@ -97,3 +97,21 @@ class GrainMotion:
         for name in ("position", "velocity", "spin"):
             if not np.all(np.isfinite(getattr(self, name)[self.present])):
                 raise ValueError(f"the {name} of a present grain is not finite")
+
+
+def move_freely(
+    boundary: NDArray[np.bool_] | None, i: NDArray[np.integer], j: NDArray[np.integer]
+) -> NDArray[np.bool_]:
+    """Return which pairs have a body whose motion is not imposed: others need not touch, and bear what they may.
+
+    Parameters
+    ----------
+    boundary : (n,) bool or None
+        Grains of the boundary; None: none.
+    i, j : (c,) int
+        Grain, and grain or wall, of which the rows begin at n.
+    """
+    if boundary is None:
+        return np.ones(len(i), np.bool_)
+    imposed = np.append(boundary, True)  # the last row stands for all walls
+    return ~(boundary[i] & imposed[np.minimum(j, len(boundary))])

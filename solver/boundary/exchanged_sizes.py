@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ..bodies.grains import Array
+from ..bodies.grains import Array, move_freely
 
 TOUCHING = 0.25  # of the least difference of two sizes: greatest gap or overlap of a touching pair
 INSIDE = 3.0  # touching neighbours that outweigh one inside which the grain lies
@@ -82,9 +82,7 @@ def find_exchanged_sizes(
     reach = float(sizes.max()) + touch
     from_walls = np.empty((*position.shape[:2], 0)) if from_walls is None else from_walls
     pairs = _candidate_pairs(position, from_walls, float(sizes.max()) + reach, reach)
-    if boundary is not None:
-        imposed = np.append(boundary, np.ones(from_walls.shape[2], np.bool_))
-        pairs = pairs.select(~(imposed[pairs.grain] & imposed[pairs.other]))
+    pairs = pairs.select(move_freely(boundary, pairs.grain, pairs.other))
     pairs, frames = _at_known_walls(pairs, radius, touch), len(position)
     found, of_walls = radius.copy(), np.zeros(from_walls.shape[2])
     for _ in range(ROUNDS):

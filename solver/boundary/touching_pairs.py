@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ..bodies.grains import Array
+from ..bodies.grains import Array, move_freely
 from ..robust_scale import SD_OVER_MAD
 
 WIDEST = 0.15  # mean diameters: gap of a pair that may touch although it is distorted
@@ -58,8 +58,7 @@ def find_near_pairs(position: Array, radius: Array, boundary: NDArray[np.bool_] 
     reach = WIDEST * 2.0 * float(radius.mean())
     here = np.flatnonzero(np.isfinite(position[:, 0]))
     i, j = here[KDTree(position[here]).query_pairs(2.0 * float(radius.max()) + reach, output_type="ndarray")].T
-    if boundary is not None:
-        i, j = i[moves := ~(boundary[i] & boundary[j])], j[moves]
+    i, j = i[moves := move_freely(boundary, i, j)], j[moves]
     branch = position[j] - position[i]
     length = np.linalg.norm(branch, axis=1)
     gap = length - radius[i] - radius[j]

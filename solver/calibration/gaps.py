@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..bodies.cell import Cell, reduce_vectors
 from ..bodies.disc_pairs import find_disc_pairs
-from ..bodies.grains import Array
+from ..bodies.grains import Array, move_freely
 from ..bodies.wall_shapes import STRAIGHT, Sides, all_sides, faces_walls, wall_distance
 from ..even_subset import even_subset
 
@@ -117,12 +117,9 @@ def find_gap_rows(sequence: MeasuredSequence, reach: float, *, wall_reach: float
     wall_reach = reach if wall_reach is None else wall_reach
     n = sequence.grain_count
     frames, first, second = [], [], []
-    imposed = np.zeros(n + sequence.wall_count, np.bool_)
-    if sequence.boundary is not None:
-        imposed[:n], imposed[n:] = sequence.boundary, True
     for k in range(sequence.frame_count):
         i, j = _pairs_of_frame(sequence, k, reach, wall_reach)
-        i, j = i[moves := ~(imposed[i] & imposed[j])], j[moves]
+        i, j = i[moves := move_freely(sequence.boundary, i, j)], j[moves]
         frames.append(np.full(len(i), k))
         first.append(i)
         second.append(j)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..bodies.cell import Cell
 from ..bodies.disc_pairs import find_disc_pairs
-from ..bodies.grains import Array, Grains
+from ..bodies.grains import Array, Grains, move_freely
 from ..bodies.wall_shapes import DEEPEST, Sides, distance_from_walls, faces_walls
 from ..bodies.walls import Walls
 from ..quantity import Quantity
@@ -119,9 +119,7 @@ def detect_contacts(
     """
     wall_threshold = threshold if wall_threshold is None else wall_threshold
     i, j = _grain_pairs(grains.radius, position, present, threshold, walls.cell)
-    if grains.boundary is not None:
-        kept = ~(grains.boundary[i] & grains.boundary[j])  # the motion of both is imposed
-        i, j = i[kept], j[kept]
+    i, j = i[moves := move_freely(grains.boundary, i, j)], j[moves]
     wi, wj = _wall_pairs(grains.radius, position, present & grains.free, walls, wall_threshold)
     return measure_contacts(grains, position, walls, np.concatenate([i, wi]), np.concatenate([j, wj + grains.count]))
 

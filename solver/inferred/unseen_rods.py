@@ -140,10 +140,10 @@ def infer_unseen(
     sought = frames >= FEWEST_FRAMES and endpoints.shape[1] > 0 and tolerance.apart < COARSE * limits[0]
     if sought:
         near: Array | None = None
+        free = np.ones(len(radius), np.bool_) if settings.boundary is None else ~settings.boundary
         for _ in range(PASSES):
-            free = np.ones(len(radius) + len(rods), np.bool_)
-            free[: len(radius)] = True if settings.boundary is None else ~settings.boundary
-            around = Surroundings(*_with(radius, position, present, rods), endpoints, noise, side, free)
+            every = np.append(free, np.ones(len(rods), np.bool_))
+            around = Surroundings(*_with(radius, position, present, rods), endpoints, noise, side, every)
             if known is None:
                 proposed = _propose_of_any_size(around, limits, near, tolerance)
             else:

@@ -74,11 +74,11 @@ def crop_to_interior(observed: ObservedData, rng: np.random.Generator) -> Observ
     )  # fmt: skip
 
 
-def crop_after(depart: Departure) -> Departure:
-    """Keep the interior of the packing, after another departure."""
+def in_turn(first: Departure, second: Departure) -> Departure:
+    """Depart in two ways, one after the other."""
 
     def both(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
-        return crop_to_interior(depart(observed, rng), rng)
+        return second(first(observed, rng), rng)
 
     return both
 
@@ -86,11 +86,6 @@ def crop_after(depart: Departure) -> Departure:
 def omit_loads(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
     """State no load of any wall."""
     return replace(observed, known=replace(observed.known, pressure={}))
-
-
-def omit_loads_after(depart: Departure) -> Departure:
-    """State no load of any wall, after another departure."""
-    return lambda observed, rng: omit_loads(depart(observed, rng), rng)
 
 
 def state_membrane(observed: ObservedData, rng: np.random.Generator) -> ObservedData:

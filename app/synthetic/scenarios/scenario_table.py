@@ -16,16 +16,15 @@ from .departures import (
     HIGH_FRICTION,
     LOW_FRICTION,
     Departure,
-    crop_after,
     crop_to_interior,
     displace_centres,
+    in_turn,
     keep_ten_frames,
     keep_unchanged,
     misstate_friction,
     misstate_wall_ends,
     move_camera,
     omit_loads,
-    omit_loads_after,
     omit_rods,
     scatter_radii,
     shrink_radii,
@@ -120,10 +119,11 @@ TINY = LoadingPath(shear_cyclically, 0.01, initial_shear=2.0, plates=("top",))
 
 
 def _cropped(
-    meaning: str, loading: LoadingPath, departure: Departure = crop_to_interior, noise: float = 1e-5,
+    meaning: str, loading: LoadingPath, departure: Departure = keep_unchanged, noise: float = 1e-5,
     group: Group = "correct",
 ) -> Scenario:  # fmt: skip
-    return Scenario(f"{meaning}; cropped as in `outer`", loading, departure, noise, scale_stated=False, group=group)
+    both = in_turn(departure, crop_to_interior)
+    return Scenario(f"{meaning}; cropped as in `outer`", loading, both, noise, scale_stated=False, group=group)
 
 
 def _sheared(**changes: Any) -> LoadingPath:
@@ -236,12 +236,12 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     "outer_gravity": _cropped("gravity", PUSHED_HEAP),
     "outer_moving": _cropped("moving", MOVING),
     "outer_noise_40": _cropped("sheared; 40 µm noise", MOVED, noise=4e-5),
-    "outer_radii_03": _cropped("sheared; radii with .3 % random error", MOVED, crop_after(scatter_radii(0.003))),
+    "outer_radii_03": _cropped("sheared; radii with .3 % random error", MOVED, scatter_radii(0.003)),
     "outer_theta_sign": _cropped(
-        "sheared; rotations with the wrong sign", MOVED, crop_after(scale_rotation(-1.0)), group="wrong input"
+        "sheared; rotations with the wrong sign", MOVED, scale_rotation(-1.0), group="wrong input"
     ),
     "outer_mu_05": _cropped(
-        "sheared; friction stated as .5 instead of .25", MOVED, crop_after(misstate_friction(0.5)), group="wrong input"
+        "sheared; friction stated as .5 instead of .25", MOVED, misstate_friction(0.5), group="wrong input"
     ),
     "unknown_load": Scenario("sheared; the load is not stated", MOVED, omit_loads, scale_stated=False),
     "circle": Scenario(
@@ -389,6 +389,6 @@ UNLOADED: dict[ScenarioName, ScenarioName] = {
 for _name, _loaded in UNLOADED.items():
     _of = SCENARIOS[_loaded]
     SCENARIOS[_name] = replace(
-        _of, meaning=f"`{_loaded}`; the load is not stated", departure=omit_loads_after(_of.departure),
+        _of, meaning=f"`{_loaded}`; the load is not stated", departure=in_turn(_of.departure, omit_loads),
         scale_stated=False,
     )  # fmt: skip

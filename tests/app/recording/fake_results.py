@@ -81,10 +81,11 @@ def with_fringes(results: Results) -> Results:
 
 
 def make_truth(results: Results, rng: np.random.Generator) -> TruthContacts:
-    """Return the forces of the results with 10 % of noise, on all but a few of the contacts."""
+    """Return the forces of the results with 10 % of noise, on all but a few of the weaker half of the contacts."""
     parts = []
     for forces in results.frames:
-        kept = rng.random(forces.contacts.count) > 0.03
+        weak = forces.fn < np.median(forces.fn)
+        kept = (rng.random(forces.contacts.count) > 0.06) | ~weak
         noise = 1.0 + 0.1 * rng.standard_normal((2, int(kept.sum())))
         i, j = forces.contacts.i[kept], forces.contacts.j[kept]
         parts.append((np.full(len(i), forces.frame), i, j, forces.fn[kept] * noise[0], forces.ft[kept] * noise[1]))

@@ -109,4 +109,4 @@ def test_truth_is_compared_on_the_same_contacts(results):
         key = truth.i[rows] * results.frames[k].contacts.body_count + truth.j[rows]
         assert frame.contacts.key.tolist() == sorted(key.tolist())
         assert frame.fn.sum() == pytest.approx(truth.fn[rows].sum())
-        assert 0.8 < comparison.agreement[k].r_fn < 1.0  # a strong contact may be among those that the truth lacks
+        assert 0.9 < comparison.agreement[k].r_fn < 1.0

@@ -349,7 +349,9 @@ def test_a_wrong_argument_is_named(wrong: dict[str, float], named: str, tmp_path
 
 def test_a_cropped_packing_keeps_the_error_that_was_made_before(observed: ObservedData) -> None:
     cropped = departures.crop_to_interior(observed, np.random.default_rng(1))
-    both = departures.crop_after(departures.misstate_friction(0.5))(observed, np.random.default_rng(1))
+    both = departures.in_turn(departures.misstate_friction(0.5), departures.crop_to_interior)(
+        observed, np.random.default_rng(1)
+    )
     assert both.outer
     assert both.known.friction == 0.5
     np.testing.assert_array_equal(both.id, cropped.id)

@@ -163,7 +163,7 @@ MUTANTS = [
     *mutants_of(
         "solver/assessment/penalties.py",
         PENALTIES,
-        ("1.0 - 1.0 / math.sqrt(1.0 + share)", "1.0 - 1.0 / (1.0 + share)"),
+        ("1.0 - 1.0 / math.sqrt(1.0 + missing)", "1.0 - 1.0 / (1.0 + missing)"),
         ("if not each.counted:", "if each.counted:"),
         ("1.0 if frame.soft else correlation_by_intervals(frame)", "correlation_by_intervals(frame)"),
         ("slope * expected - least", "slope * expected"),

@@ -23,6 +23,12 @@ MUTANTS = [
     ),
     *mutants_of(
         "solver/bodies/grains.py",
+        "tests/solver/calibration/test_gaps.py",
+        ("~(boundary[i] & imposed", "~(boundary[i] | imposed"),
+        ("imposed = np.append(boundary, True)", "imposed = np.append(boundary, False)"),
+    ),
+    *mutants_of(
+        "solver/bodies/grains.py",
         TESTS,
         ("density * length * np.pi * radius**2", "density * length * np.pi * radius"),
         ("return 0.5 * self.mass * self.radius**2", "return 0.4 * self.mass * self.radius**2"),
@@ -70,7 +76,7 @@ MUTANTS = [
     *mutants_of(
         "solver/inferred/unseen_rods.py",
         "tests/solver/inferred/test_unseen_rods.py",
-        ("True if settings.boundary is None else ~settings.boundary", "True"),
+        ("if settings.boundary is None else ~settings.boundary", "if True else ~settings.boundary"),
         ("anew >= LEAST_REARRANGED and misfit <= SIZE_MISFIT", "misfit <= SIZE_MISFIT"),
         (
             "anew >= LEAST_REARRANGED and misfit <= SIZE_MISFIT * np.sqrt(2.0) * around.noise",

@@ -26,8 +26,7 @@ MUTANTS = [
         ("tests/solver/calibration/test_gaps.py", *CALIBRATE, SCALE),
         ("gap[c] = distance - radius[i] - radius[j]", "gap[c] = distance - radius[i]"),
         ("endpoints[kw, w].mean(axis=1)", "endpoints[kw, w, 0]"),
-        ("~(imposed[i] & imposed[j])", "~(imposed[i] & False)"),
-        ("imposed[:n], imposed[n:] = sequence.boundary, True", "imposed[:n] = sequence.boundary"),
+        ("move_freely(sequence.boundary, i, j)", "move_freely(None, i, j)"),
     ),
     *mutants_of(
         "solver/calibration/normal_equations.py",
@@ -181,13 +180,13 @@ MUTANTS = [
     *mutants_of(
         "solver/boundary/touching_pairs.py",
         "tests/solver/boundary/test_touching_pairs.py",
-        ("~(boundary[i] & boundary[j])", "~(boundary[i] | boundary[j])"),
+        ("move_freely(boundary, i, j)", "move_freely(None, i, j)"),
     ),
     *mutants_of(
         "solver/boundary/exchanged_sizes.py",
         "tests/solver/boundary/test_exchanged_sizes.py",
         ("trial < trial.max(axis=0) - ALIKE", "trial < trial.max(axis=0) - 9.0"),
-        ("~(imposed[pairs.grain] & imposed[pairs.other])", "(pairs.grain >= 0)"),
+        ("move_freely(boundary, pairs.grain, pairs.other)", "move_freely(None, pairs.grain, pairs.other)"),
         ("np.abs(sizes[:, None] - radius))\n        best", "0.0 * trial)\n        best"),
         ("change |= (gain > -ALIKE)", "change |= (gain > 9.0)"),
         (">= KNOWN * np.maximum(count, 1.0)", ">= 0.0 * count"),

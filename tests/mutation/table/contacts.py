@@ -19,7 +19,7 @@ MUTANTS = [
         ("arm = radius[a] + 0.5 * gap[c]", "arm = radius[a]"),
         ("gap[c] = distance - radius[a] - radius[b]", "gap[c] = distance - 2.0 * radius[a]"),
         ("return i[faces], w[faces]", "return i, w"),
-        ("kept = ~(grains.boundary[i] & grains.boundary[j])", "kept = ~(grains.boundary[i] | grains.boundary[j])"),
+        ("move_freely(grains.boundary, i, j)", "move_freely(None, i, j)"),
         ("x += shift[c, 0]", "x -= shift[c, 0]"),
         (
             "find_disc_pairs(position[rows], radius[rows], threshold)",
