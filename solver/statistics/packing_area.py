@@ -13,7 +13,7 @@ from ..bodies.walls import Walls
 PARALLEL = np.radians(10.0)  # greatest angle between walls of one side, as the halves of a box that is split
 CORNERS = 2048  # of the polygon that approximates a circle
 FEWEST_AROUND = 4  # boundary rods around an opening
-MOST_BEYOND = 0.02  # fraction of the rods whose centres are beyond the line of a wall around all of them
+MOST_BEYOND = 0.1  # fraction of the rods beyond the line of a wall around them: some rise beside a plate
 ROUNDING = 1e-9  # [m]
 WIDEST_PORE = 1.5  # distances of neighbouring boundary rods: radius of the circle through three rods around a pore
 
