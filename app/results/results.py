@@ -39,10 +39,14 @@ class TruthContacts:
     ft: Array  # (t,) [N]
 
     def outside(self, boundary: NDArray[np.bool_] | None) -> TruthContacts:
-        """Return the contacts without those between two boundary grains (mask (n,), None: no such grains)."""
+        """Return the contacts of free grains.
+
+        Those of grains of the boundary (mask (n,), None: no such grains) with one another and with walls are left out:
+        nothing shows their forces.
+        """
         if boundary is None:
             return self
-        of_boundary = np.append(boundary, False)  # the last row stands for all walls
+        of_boundary = np.append(boundary, True)  # the last row stands for all walls
         n = len(boundary)
         keep = ~(of_boundary[np.minimum(self.i, n)] & of_boundary[np.minimum(self.j, n)])
         return TruthContacts(self.frame[keep], self.i[keep], self.j[keep], self.fn[keep], self.ft[keep])

@@ -15,8 +15,8 @@ from ..detection.contact_networks import Network
 from ..part_settings import ChainSettings
 from .force_memory import ForceMemory
 from .interval import Interval
-from .problem import ContactProblem, inertial_impedance, kinematic_impedance
-from .solve import NlgsSettings, Solution, relative_force_residual, solve
+from .problem import ContactProblem, inertial_impedance, kinematic_impedance, moved_before, with_boundary
+from .solve import NlgsSettings, Solution, relative_force_residual, solve, velocity_change
 from .sweep_record import SweepHistory, SweepRecorder
 
 
@@ -76,13 +76,18 @@ def advance_chain_through(interval: Interval, memory: ForceMemory, settings: Cha
         every = recorder.strides() if nlgs.force_change is None else 1
         return solve(problem, nlgs, guess=guess, observer=recorder.on_sweep, every=every, measured=recorder.measured)
 
+    def instant(fraction: float) -> tuple[ContactProblem, Contacts, Walls]:
+        problem, contacts, walls = interval.at(fraction, impedance)
+        return problem if support is None else moved_before(problem, support), contacts, walls
+
     initial_memory, sweeps_done = memory, 0
+    support = None if cold_start else _support(interval, initial_memory, impedance, 1.0 / steps)
     for step in range(1, steps):
-        problem, contacts, _ = interval.at(step / steps, impedance)
+        problem, contacts, _ = instant(step / steps)
         solution = solve_step(problem, contacts, memory.recall(contacts))
         memory = memory.renew(contacts, solution.force, motion.grains.present)
         sweeps_done += solution.sweeps
-    problem, contacts, walls = interval.at(1.0, impedance)
+    problem, contacts, walls = instant(1.0)
     solution = solve_step(problem, contacts, memory.recall(contacts))
     previous_force = None if cold_start else initial_memory.recall(contacts)
     return ChainStep(
@@ -99,14 +104,25 @@ def advance_chain_through(interval: Interval, memory: ForceMemory, settings: Cha
     )
 
 
+def _support(interval: Interval, memory: ForceMemory, impedance: Array, fraction: float) -> Array | None:
+    """Velocities (n, 3) [m/s] that cancel what the previous forces do to boundary grains; None: there are none."""
+    boundary = interval.packing.grains.boundary
+    if boundary is None:
+        return None
+    problem, contacts, _ = interval.at(fraction, impedance)
+    return np.where(boundary[:, None], -velocity_change(problem, memory.recall(contacts)), 0.0)
+
+
 def _impedance(packing: Packing, motion: FrameMotion, settings: ChainSettings, steps: int) -> tuple[Array, float]:
     scale, velocity = force_scale(packing, settings), motion.velocity_rms
     weight = packing.material.formal_weight
     if settings.kappa is None:
         step = motion.interval / steps
         impedance = inertial_impedance(packing.grains, interval=step, formal_weight=weight)
+        impedance = with_boundary(impedance, packing.grains, force_scale=scale, error=0.0)  # as in the paper
         return impedance, float(packing.grains.mass.mean()) * velocity / (step * scale)
     impedance = kinematic_impedance(
         packing.grains, kappa=settings.kappa, force_scale=scale, velocity_scale=velocity, formal_weight=weight
     )
-    return impedance, settings.kappa
+    error = float(np.sqrt(2.0)) * motion.sigma / motion.interval
+    return with_boundary(impedance, packing.grains, force_scale=scale, error=error), settings.kappa

@@ -4,6 +4,10 @@ The unknown forces act on bodies of *impedance* Z [N s/m]: forces produce the ve
 paper's scheme has Z = m / ((1−η) δt). Measured grain velocities then do not influence the forces, because this Z is
 some nine orders of magnitude too small. The kinematic number κ sets Z = κ f₀ / v_rms · m / m̄ / (1−η) instead, with
 f₀ = σ L d: forces of κ f₀ cancel the whole measured motion. The rotational impedance is ½ Z R², as of solid rods.
+
+The motion of a boundary rod is imposed, but known with an error only: a rod between two of them, whose distance seems
+to shrink by that error, would bear any force. A change of f₀ of its reaction therefore moves it by the error of its
+displacement, √2 σ: Z = f₀ δt / (√2 σ). The reaction that it had before moves it by nothing.
 """
 
 from __future__ import annotations
@@ -46,7 +50,7 @@ class ContactProblem(NamedTuple):
     # direction in which the plate is free
     wall: Float[Array, "q 8"]
     friction: Float[Array, "2"]  # between grains, with walls
-    external: Float[Array, "n 2"]  # [N] weight of the grains
+    external: Float[Array, "n 3"]  # [N] weight of the grains; 1 of those whose forces must balance, else 0
     rows: Int64[np.ndarray, " c"]  # c = p + q: record → row of Contacts
 
 
@@ -93,6 +97,18 @@ def inertial_impedance(grains: Grains, *, interval: float, formal_weight: float 
     return grains.mass / interval / (1.0 - formal_weight)
 
 
+def with_boundary(impedance: Array, grains: Grains, *, force_scale: float, error: float) -> Array:
+    """Replace the impedances (n,) [N s/m] of boundary grains, whose velocity is known with this error [m/s].
+
+    Notes
+    -----
+    Z = f₀ / error; infinite without an error.
+    """
+    if grains.boundary is None:
+        return impedance
+    return np.where(grains.boundary, force_scale / error if error > 0.0 else np.inf, impedance)
+
+
 class PreparedContacts(NamedTuple):
     """What is known of contacts before a problem is assembled."""
 
@@ -116,7 +132,7 @@ def assemble(
     Parameters
     ----------
     impedance : (n,)
-        Impedance of every grain [N s/m].
+        Impedance of every grain [N s/m]; infinite: no force moves it.
     prepared : PreparedContacts, optional
         What is known of the contacts beforehand.
 
@@ -183,14 +199,23 @@ def with_impedance(
     return problem._replace(body=body, plate=plate, pair=pair, wall=wall, external=weight)
 
 
+def moved_before(problem: ContactProblem, change: Array) -> ContactProblem:
+    """Add changes (n, 3) [m/s] to the velocities vx, vy, ω R without contact forces."""
+    body = aligned_zeros(problem.body.shape)
+    body[:] = problem.body
+    body[:, :3] += change
+    return problem._replace(body=body)
+
+
 def _free_motion(
     grains: Grains, motion: GrainMotion, walls: Walls, material: Material, impedance: Array
 ) -> tuple[Array, Array, Array]:
-    """Motion of bodies (n, 4) and plates (w, 2) without contact forces, as of `ContactProblem`, and weight (n, 2)."""
-    moved = motion.present & grains.free  # by forces; the others keep their measured velocity
-    compliance = np.where(grains.free, 1.0 / impedance, 0.0)
+    """Motion of bodies (n, 4) and plates (w, 2) without contact forces, and `external` (n, 3), see `ContactProblem`."""
+    moved = motion.present & grains.free  # by their weight, too
+    compliance = 1.0 / impedance
     weight = grains.weight(material.gravity)
     weight[~moved] = 0.0
+    external = np.column_stack([weight, moved.astype(np.float64)])
     body = np.zeros((grains.count, 4))
     body[:, :2] = motion.velocity + weight * compliance[:, None]
     body[:, 2] = motion.spin * grains.radius
@@ -201,10 +226,10 @@ def _free_motion(
 
     plate = np.zeros((walls.count, 2))
     if walls.loaded.any():
-        plate_compliance = 1.0 / (PLATE_IMPEDANCE * impedance[motion.present].mean())
+        plate_compliance = 1.0 / (PLATE_IMPEDANCE * impedance[moved].mean())
         plate[walls.loaded, 0] = -walls.load[walls.loaded] * plate_compliance
         plate[walls.loaded, 1] = plate_compliance
-    return body, plate, weight
+    return body, plate, external
 
 
 def _effective_impedances(

@@ -206,6 +206,11 @@ def solve(
     return _finish(problem, force, stop, number)
 
 
+def velocity_change(problem: ContactProblem, force: Array) -> Array:
+    """Compute how forces (c, 2) [N] in the order of the contacts change the velocities vx, vy, ω R (n, 3) [m/s]."""
+    return (_start(problem, force)[1] - problem.body)[:, :3]
+
+
 def relative_force_residual(problem: ContactProblem, force: Array) -> tuple[float, float]:
     """Compute worst and mean |ΣF| on a grain over the mean f_n, for forces (c, 2) [N] in the order of the contacts."""
     force, body, _ = _start(problem, force)

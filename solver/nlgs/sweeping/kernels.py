@@ -281,11 +281,11 @@ def measure_force_residual(problem, body):  # type: ignore[no-untyped-def]
     work = aligned_numbers(3 * L)  # worst, sum and number of grains, per lane
     work[:] = 0.0
     for block in range((count + L - 1) // L):
-        first, second = block * (4 * L), block * (2 * L)
+        first, second = block * (4 * L), block * (3 * L)
         for k in range(min(L, count - block * L)):
-            row, at = first + 4 * k, second + 2 * k
+            row, at = first + 4 * k, second + 3 * k
             compliance = current[row + 3]
-            present = 1.0 if compliance > 0.0 else 0.0  # a lost grain has a zero record
+            present = external[at + 2]
             impedance = present / (compliance if compliance > 0.0 else 1.0)
             x = external[at] + (current[row] - free[row]) * impedance
             y = external[at + 1] + (current[row + 1] - free[row + 1]) * impedance

@@ -166,4 +166,4 @@ def find_equilibrium(problem, equilibrium):  # type: ignore[no-untyped-def]
         compliance = problem.body[g, 3]
         equilibrium[g // L, 0, g % L] = problem.body[g, 0] - problem.external[g, 0] * compliance
         equilibrium[g // L, 1, g % L] = problem.body[g, 1] - problem.external[g, 1] * compliance
-        equilibrium[g // L, 2, g % L] = 1.0 / compliance if compliance > 0.0 else 0.0
+        equilibrium[g // L, 2, g % L] = 1.0 / compliance if problem.external[g, 2] > 0.0 else 0.0

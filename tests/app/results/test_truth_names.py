@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from rodsight.process.errors import InputError
 from rodsight.process.frame_range import FrameRange
+from rodsight.results.results import TruthContacts
 from rodsight.results.truth import names_in_table, names_of_given, read_truth, true_ids, true_names
 from rodsight.tracks import Tracks, TrackStatus
 
@@ -80,3 +81,10 @@ def test_names_that_a_tracker_confused_are_those_of_the_table_in_every_frame(tmp
     assert found.frame.tolist() == [0, 1, 1]
     assert list(zip(found.i.tolist(), found.j.tolist(), strict=True)) == [(0, 1), (0, 1), (2, 3)]
     np.testing.assert_array_equal(names_in_table(replace(tracks, given_id=names[1:])), names[1:])
+
+
+def test_nothing_shows_the_forces_of_boundary_grains_on_one_another_and_on_walls() -> None:
+    i, j = np.array([0, 0, 1, 1, 2]), np.array([1, 2, 2, 3, 3])  # three grains, one wall
+    truth = TruthContacts(np.zeros(5, np.int64), i, j, np.arange(5.0), np.zeros(5))
+    assert truth.outside(None) is truth
+    assert truth.outside(np.array([True, True, False])).fn.tolist() == [1.0, 2.0, 4.0]

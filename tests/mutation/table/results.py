@@ -18,6 +18,11 @@ MUTANTS = [
         ("wall = {name: ids.shape[-1] + row", "wall = {name: len(ids) + row"),
     ),
     *mutants_of(
+        "app/results/results.py",
+        "tests/app/results/test_truth_names.py",
+        ("of_boundary = np.append(boundary, True)", "of_boundary = np.append(boundary, False)"),
+    ),
+    *mutants_of(
         "app/results/hdf5/frame_pieces.py",
         STORE,
         ("ends[path].append(ends[path][-1] + len(piece[counted]))", "ends[path].append(ends[path][-1] + 1)"),

@@ -14,7 +14,7 @@ from rodsight.solver.bodies.packing import Material
 from rodsight.solver.bodies.walls import Walls
 from rodsight.solver.contacts.contacts import Contacts
 
-PLATE = 30.0  # impedance of a loaded plate, in mean impedances of the present grains
+PLATE = 30.0  # impedance of a loaded plate, in mean impedances of the free grains
 
 
 @dataclass
@@ -42,9 +42,9 @@ class PlainSolver:
         self.grains, self.motion, self.walls, self.contacts = grains, motion, walls, contacts
         self.material = material
         self.closing = np.zeros(contacts.count) if closing is None else closing
-        self.plate_impedance = PLATE * float(np.mean([z for z, p in zip(impedance, motion.present, strict=True) if p]))
-        # Forces do not move grains of the boundary.
-        self.impedance = np.where(grains.free, impedance, np.inf)
+        self.free = motion.present & grains.free  # the others have no weight, and need no equilibrium
+        self.plate_impedance = PLATE * float(np.mean([z for z, f in zip(impedance, self.free, strict=True) if f]))
+        self.impedance = impedance
         self.inertia = 0.5 * self.impedance * grains.radius**2
 
     def friction(self, c: int) -> float:
@@ -56,7 +56,8 @@ class PlainSolver:
         gravity = np.asarray(self.material.gravity)
         bodies = BodyVelocities(self.motion.velocity.copy(), self.motion.spin.copy(), np.zeros(self.walls.count))
         for k in range(self.grains.count):
-            bodies.velocity[k] += self.grains.mass[k] * gravity / self.impedance[k]
+            if self.free[k]:
+                bodies.velocity[k] += self.grains.mass[k] * gravity / self.impedance[k]
         for w in range(self.walls.count):
             if np.isfinite(self.walls.load[w]):
                 bodies.plate[w] = -self.walls.load[w] / self.plate_impedance
@@ -132,8 +133,7 @@ class PlainSolver:
             total[i] = total[i] - vector
             if j < self.grains.count:
                 total[j] = total[j] + vector
-        present = self.motion.present & self.grains.free
-        size = [float(np.hypot(*total[k])) for k in range(self.grains.count) if present[k]]
+        size = [float(np.hypot(*total[k])) for k in range(self.grains.count) if self.free[k]]
         return max(size), sum(size) / len(size)
 
     def _apply(self, bodies: BodyVelocities, c: int, fn: float, ft: float) -> None:

@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rodsight.solver.bodies.grains import GrainMotion, Grains
 from rodsight.solver.bodies.motion import FrameMotion
 from rodsight.solver.bodies.packing import Material, Packing
 from rodsight.solver.detection.contact_networks import PairProbability, ProbabilityNetwork, ThresholdNetwork
 from rodsight.solver.nlgs.chain import ChainSettings, advance_chain, advance_chain_through, force_scale
 from rodsight.solver.nlgs.force_memory import ForceMemory
 from rodsight.solver.nlgs.interval import Interval
+from rodsight.solver.nlgs.problem import with_boundary
 
 from tests.packings import LENGTH, squeezed_heap
 
@@ -99,3 +101,46 @@ def test_an_ambiguous_contact_carries_less_force():
     assert sure > 0.0
     assert force(0.3) == sure
     assert force(0.004) < sure
+
+
+NARROWING = 1e-6  # [m] that two rods of the boundary seem to approach in an interval
+
+
+def clamped(error, narrowing=NARROWING, memory=None):
+    """Chain of a rod between two rods of the boundary whose distance seems to shrink; error: of a position [m]."""
+    grains = Grains(np.full(3, 0.01), np.ones(3), np.array([True, False, True]))
+    velocity = np.array([[0.0, 0.0], [-narrowing / 4.0, 0.0], [-narrowing / 2.0, 0.0]])
+    place = np.array([[0.0, 0.0], [0.02, 0.0], [0.04, 0.0]])
+    state = GrainMotion(place, velocity, np.zeros(3), np.ones(3, np.bool_))
+    packing = Packing(grains, LENGTH, Material(0.3, 0.3, 0.0), np.empty(0))
+    none = np.empty((0, 2, 2))
+    motion = FrameMotion(2.0, state, none, none, True, error)
+    settings = replace(SETTINGS, sweeps=2000, kappa=0.05)
+    step = advance_chain(packing, motion, memory or ForceMemory.empty(), settings, ThresholdNetwork(1e-5))
+    return step, force_scale(packing, settings)
+
+
+def test_a_clamped_rod_bears_what_moves_the_boundary_by_its_error():
+    """Two rods of the boundary, each moved by half of the narrowing: f = f₀ · (narrowing / 2) / (√2 σ)."""
+    for error in (2e-6, 1e-5):
+        step, scale = clamped(error)
+        assert step.solution.fn == pytest.approx([scale * NARROWING / 2.0 / (np.sqrt(2.0) * error)] * 2, rel=1e-3)
+        assert step.solution.unbalance < 1e-3  # the rods of the boundary need no equilibrium
+    assert clamped(2e-6)[0].solution.fn.min() > 4.0 * clamped(1e-5)[0].solution.fn.max()
+
+
+def test_a_reaction_that_was_there_before_moves_the_boundary_no_more():
+    first, _ = clamped(2e-6)
+    still, _ = clamped(2e-6, 0.0, first.memory)
+    assert still.solution.fn == pytest.approx(first.solution.fn, rel=1e-3)
+    assert still.old_unbalance < 1e-6
+    again, _ = clamped(2e-6, NARROWING, first.memory)
+    assert again.solution.fn == pytest.approx(2.0 * first.solution.fn, rel=1e-3)
+
+
+def test_a_boundary_without_an_error_and_that_of_the_papers_scheme_stay():
+    grains = Grains(np.full(3, 0.01), np.ones(3), np.array([True, False, True]))
+    impedance = np.array([1.0, 2.0, 3.0])
+    assert with_boundary(impedance, grains, force_scale=6.0, error=3.0).tolist() == [2.0, 2.0, 2.0]
+    assert with_boundary(impedance, grains, force_scale=6.0, error=0.0).tolist() == [np.inf, 2.0, np.inf]
+    assert with_boundary(impedance, replace(grains, boundary=None), force_scale=6.0, error=3.0) is impedance
