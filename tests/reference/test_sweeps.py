@@ -123,6 +123,10 @@ def test_the_weight_of_a_lost_grain_does_not_act(case):
     assert np.all(case.assemble().external[list(LOST)] == 0.0)
 
 
+def test_forces_on_the_boundary_and_on_lost_grains_need_not_balance(case):
+    assert np.array_equal(case.assemble().external[:, 2] > 0.0, case.motion.present & case.grains.free)
+
+
 def test_impedances_follow_the_masses(case):
     grains = case.grains
     kinematic = kinematic_impedance(grains, kappa=0.05, force_scale=40.0, velocity_scale=1e-5, formal_weight=0.2)

@@ -106,7 +106,7 @@ def test_an_ambiguous_contact_carries_less_force():
 NARROWING = 1e-6  # [m] that two rods of the boundary seem to approach in an interval
 
 
-def clamped(error, narrowing=NARROWING, memory=None):
+def clamped(error, narrowing=NARROWING, memory=None, kappa=0.05):
     """Chain of a rod between two rods of the boundary whose distance seems to shrink; error: of a position [m]."""
     grains = Grains(np.full(3, 0.01), np.ones(3), np.array([True, False, True]))
     velocity = np.array([[0.0, 0.0], [-narrowing / 4.0, 0.0], [-narrowing / 2.0, 0.0]])
@@ -115,7 +115,7 @@ def clamped(error, narrowing=NARROWING, memory=None):
     packing = Packing(grains, LENGTH, Material(0.3, 0.3, 0.0), np.empty(0))
     none = np.empty((0, 2, 2))
     motion = FrameMotion(2.0, state, none, none, True, error)
-    settings = replace(SETTINGS, sweeps=2000, kappa=0.05)
+    settings = replace(SETTINGS, sweeps=2000, kappa=kappa)
     step = advance_chain(packing, motion, memory or ForceMemory.empty(), settings, ThresholdNetwork(1e-5))
     return step, force_scale(packing, settings)
 
@@ -143,4 +143,5 @@ def test_a_boundary_without_an_error_and_that_of_the_papers_scheme_stay():
     impedance = np.array([1.0, 2.0, 3.0])
     assert with_boundary(impedance, grains, force_scale=6.0, error=3.0).tolist() == [2.0, 2.0, 2.0]
     assert with_boundary(impedance, grains, force_scale=6.0, error=0.0).tolist() == [np.inf, 2.0, np.inf]
+    assert clamped(1e-5, kappa=None)[0].problem.body[:, 3].tolist()[::2] == [0.0, 0.0]
     assert with_boundary(impedance, replace(grains, boundary=None), force_scale=6.0, error=3.0) is impedance
