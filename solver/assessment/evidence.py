@@ -48,3 +48,5 @@ class Evidence:
     sought: bool = False  # rods that no photograph shows: no hole that is left demands one
     # Σ |ΣF|² of the grains over 2 Σ f_n², of the reported field: at least so much of the squared forces is missing
     missing_force: float = 0.0
+    # Overlap of the mean force over the noise of a position, by the position-only estimate
+    shown_overlap: float = math.nan

@@ -23,6 +23,7 @@ RELIABILITY_CORRECTION: tuple[float, float] = tuple(FITTED["motion_reliability"]
 # of the weight in fitted.toml
 WEIGHT_TERMS = (
     "constant", "correction", "unclear", "sliding", "members", "nearer", "hidden", "residual", "agreement",
+    "shown",
 )  # fmt: skip
 LEAST_WEIGHT: float = FITTED["position_weight"]["least"]  # weights below it are not used
 # Of 1 − R of a sound frame, the fraction that its motion estimate errs by on average (sixteen scenarios, seed 0). A
@@ -151,14 +152,14 @@ def evident_position_weight(evidence: Evidence) -> float:
         by which friction opposes the sliding less than it could; the measure h of hidden sliding, without which motion
         shows little; the residual u that no forces balance, because walls, friction or contacts are not as stated; the
         correlation b with the position-only estimate; and the correlations c of that estimate and d of the motion with
-        the motion-free balance of overlaps: what positions show.
+        the motion-free balance of overlaps, and the overlap o of the mean force over the noise: what positions show.
 
     Returns
     -------
     float
         w = 1/(1 + exp(−s)) in (0, 1), with a from fitted.toml, others of grains without a known load, and
         s = a_0 + a_1 ln ε + a_2 ln(1 − c) + a_3 ln p + a_4 ln D + a_5 (arctanh c − arctanh d)
-            + a_6 ln h + a_7 ln u + a_8 arctanh b.
+            + a_6 ln h + a_7 ln u + a_8 arctanh b + a_9 ln o.
 
     Errors of single grains that were corrected change gaps as forces do, which makes positions less certain in a way
     that none of these measures shows: without a known load both estimates then count alike.
@@ -194,6 +195,7 @@ def position_weight_terms(evidence: Evidence) -> Array:
         logarithm(MEASURES["hidden_sliding"](evidence), table["default_hidden"], table["hidden_range"]),
         logarithm(evidence.unbalance, table["default_residual"], table["residual_range"]),
         float(np.nan_to_num(_arctanh(evidence.agreement, table["nearer_range"]))),
+        logarithm(evidence.shown_overlap, table["default_shown"], table["shown_range"]),
     ])  # fmt: skip
 
 

@@ -17,11 +17,12 @@ from ..bodies.holes import find_holes
 from ..bodies.motion import shear_over
 from ..bodies.strain import inertial_time
 from ..contacts.contacts import Contacts, detect_contacts
-from ..contacts.pairs import Keys, align, are_among
+from ..contacts.pairs import align, are_among
 from ..convex.ensemble_members import NormalisedSlip
 from ..convex.program import Balance
 from ..detection.contact_networks import ThresholdNetwork
 from ..mixture.equilibrium_mixture import FrameBalance, mix_in_equilibrium
+from ..mixture.estimate_agreement import with_agreements, with_former_agreements
 from ..mixture.frame_mixture import ForceEstimate, Mixture, Softness, limit_by_fringes, motion_weight, overlap_scale
 from ..nlgs.chain import ChainStep, advance_chain
 from ..nlgs.force_memory import ForceMemory
@@ -131,7 +132,7 @@ def _combine(
     """
     before = state.evidence
     if not np.isnan(before.agreement) and before.agreement_age + 1 < STEADY_FRAMES:
-        carried = _with_agreements_of(evidence, before)
+        carried = with_former_agreements(evidence, before)
         weight = evident_position_weight(carried)
         if weight < LEAST_WEIGHT and expect_correlation(carried) > STEADY and before.position_weight == 0.0:
             return alone, carried
@@ -164,36 +165,13 @@ def _evidence_of_mixture(problem: FrameProblem, mixed: Estimate, alone: Evidence
 def _with_agreements(
     problem: FrameProblem, evidence: Evidence, estimate: Estimate, posterior: FramePosterior
 ) -> Evidence:
-    """Add the correlations of f_n between the estimates of a frame, over the contacts of either."""
+    """Add how far the estimates of a frame agree."""
     sequence = problem.sequence
     assert sequence.positions is not None
     assert sequence.overlap_balance is not None
     contacts, force = sequence.overlap_balance(sequence.positions.frame_of(problem.k, problem.verdicts))
-    motion, geometry = (estimate.contacts.key, estimate.fn), (posterior.contacts.key, posterior.fn)
-    balance = contacts.key, force[:, 0]
-    return replace(
-        evidence,
-        agreement=_agree(motion, geometry),
-        position_agreement=_agree(geometry, balance),
-        overlap_agreement=_agree(motion, balance),
-        agreement_age=0,
-    )
-
-
-def _with_agreements_of(evidence: Evidence, before: Evidence) -> Evidence:
-    """Carry the agreements of the previous frame on."""
-    return replace(
-        evidence,
-        agreement=before.agreement,
-        position_agreement=before.position_agreement,
-        overlap_agreement=before.overlap_agreement,
-        agreement_age=before.agreement_age + 1,
-    )
-
-
-def _agree(one: tuple[Keys, Array], two: tuple[Keys, Array]) -> float:
-    _, first, second = align(*one, *two)
-    return pearson(first, second)
+    motion, balance = (estimate.contacts.key, estimate.fn), (contacts.key, force[:, 0])
+    return with_agreements(evidence, motion, posterior, balance, problem.snapshot.sigma)
 
 
 def _motion_estimate(problem: FrameProblem, state: SequenceState) -> tuple[Estimate, Evidence]:

@@ -32,10 +32,11 @@ from ...solver.assessment.mixture_trust import (
 )
 from ...solver.baselines.motion_free import overlap_balance
 from ...solver.bodies.grains import Array
-from ...solver.contacts.pairs import Keys, align
+from ...solver.contacts.pairs import Keys
 from ...solver.dem.dem_truth import UnbalancedError
 from ...solver.frame_forces import FrameForces
 from ...solver.mixture.equilibrium_mixture import FrameBalance, mix_in_equilibrium
+from ...solver.mixture.estimate_agreement import correlate, with_agreements
 from ...solver.mixture.frame_mixture import ForceEstimate
 from ...solver.mixture.position_estimates import PositionEstimates
 from ...solver.posterior.frame_posterior import FramePosterior
@@ -43,7 +44,6 @@ from ...solver.sequence.ensemble import assemble_frame_balance
 from ...solver.sequence.frame import pose_frame
 from ...solver.sequence.frame_problem import SequenceProblem
 from ...solver.sequence.state import SequenceState
-from ...solver.statistics.agreement import pearson
 from ...synthetic.scenarios.preset_names import ScenarioName
 from .scenario_score import ScenarioSolution, StudyPlan, correct_scenario, make_planned, solve_scenario, true_forces
 from .trust_study import LEFT_OUT
@@ -216,15 +216,11 @@ def _mix_frames(
         contacts, force = overlap_balance(sequence.packing, sequence.snapshots, k, noise)
         motion = frame.contacts.key, frame.fn
         geometry, balance = (positions.contacts.key, positions.fn), (contacts.key, force[:, 0])
-        evidence = replace(
-            solution.evidence[k],
-            agreement=_correlate(motion, geometry), position_agreement=_correlate(geometry, balance),
-            overlap_agreement=_correlate(motion, balance),
-        )  # fmt: skip
+        evidence = with_agreements(solution.evidence[k], motion, positions, balance, sequence.snapshots[k].sigma)
         truth = true[k][0], true[k][1][:, 0]
         fields = [frame.fn, *mixed_forces(sequence, frame, positions, motion_reliability(evidence), WEIGHTS[1:])]
-        r = np.array([_correlate((frame.contacts.key, fn), truth) for fn in fields])
-        alone = _correlate(geometry, truth)
+        r = np.array([correlate((frame.contacts.key, fn), truth) for fn in fields])
+        alone = correlate(geometry, truth)
         found.append((position_weight_terms(evidence), r, alone, evident_position_weight(evidence)))
     return found
 
@@ -251,8 +247,3 @@ def mixed_forces(
         mix_in_equilibrium(balanced, motion, positions, reliability, position_weight=float(weight)).fn
         for weight in weights
     ]
-
-
-def _correlate(one: tuple[Keys, Array], two: tuple[Keys, Array]) -> float:
-    _, first, second = align(*one, *two)
-    return pearson(first, second)

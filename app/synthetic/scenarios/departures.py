@@ -18,6 +18,7 @@ Departure = Callable[[ObservedData, np.random.Generator], ObservedData]
 
 SHORTENED = 0.08 / 0.6  # fraction of a side's length by which it is stated too short
 UNSEEN = 0.03  # fraction of the rods
+PINNED = 0.05  # fraction of the rods
 CROPPED = 1.5  # [mean diameter] from the walls, outside the picture
 CAMERA_SHIFT = 6e-5  # [m], greatest shift of a photograph: half a pixel
 CENTRE_ERROR = 5e-5  # [m] rms of either component
@@ -97,6 +98,12 @@ def state_membrane(observed: ObservedData, rng: np.random.Generator) -> Observed
         for position, low, high in zip(observed.position, bottom, top, strict=True)
     ]
     return replace(observed, boundary=observed.id[np.any(touched, axis=0)])
+
+
+def state_pins(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """State a few rods in any place as boundary; the forces on them balance all the same."""
+    count = max(round(PINNED * len(observed.id)), 1)
+    return replace(observed, boundary=np.sort(rng.choice(observed.id, count, replace=False)))
 
 
 def move_camera(observed: ObservedData, rng: np.random.Generator) -> ObservedData:

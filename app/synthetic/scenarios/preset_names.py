@@ -19,6 +19,7 @@ ScenarioName = Literal[
     "loose", "cyclic", "noise_40", "correlated_noise", "annulus", "tilted_bed", "tiny_cycles", "power_law",
     "isotropic_centres", "stepped_centres", "rising_centres", "annulus_centres", "cycles_centres",
     "annulus_radii_1", "cycles_radii_1", "tilted_radii_1",
+    "stiff_annulus", "stiff_tiny_cycles", "stiff_stepped_loads", "pins", "stepped_pins", "tilted_pins", "cycles_pins",
     "moving", "stepped_loads", "membrane", "shear_box", "footing", "intruder", "drum", "stiffest",
     "stiff", "stiff_moving", "stiff_loose", "stiff_noise_40",
     "base_friction", "cohesion", "strong_cohesion", "friction_spread",

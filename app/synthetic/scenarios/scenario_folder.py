@@ -32,7 +32,8 @@ from .bed_paths import simulate_bed
 from .loading_paths import LoadingPath, simulate_loading
 from .observed_data import observe_truth, write_observed
 from .preset_names import ScenarioName
-from .scenario_table import SCENARIOS, Scenario
+from .scenario import Scenario
+from .scenario_table import SCENARIOS
 from .variation import vary_scenario
 
 LEAST_GRAINS = 40  # with fewer, some scenarios have no grain to omit or to roll on

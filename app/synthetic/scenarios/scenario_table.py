@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ from .departures import (
     state_corners,
     state_membrane,
     state_photoelastic_discs,
+    state_pins,
 )
 from .input_errors import (
     add_outliers,
@@ -71,31 +72,15 @@ from .loading_paths import (
     turn_core,
 )
 from .preset_names import FringedPreset, Group, ScenarioName
+from .scenario import Scenario
 
 DISC_NOISE = 1.18e-4  # [m], 0.7 % of a mean diameter of the two sizes
-
-
-@dataclass(frozen=True, slots=True)
-class Scenario:
-    """A simulated truth and how its data depart from it."""
-
-    meaning: str
-    loading: LoadingPath
-    departure: Departure = keep_unchanged
-    noise: float = 1e-5  # [m] of a position component
-    scale_stated: bool = True  # of forces, where the simulation has a loaded wall
-    group: Group = "correct"
-
-    @property
-    def scale_known(self) -> bool:
-        """Whether a loaded plate or the weight determines the scale of the forces."""
-        loaded = bool(self.loading.plates or self.loading.measured)
-        return self.scale_stated and (loaded or any(self.loading.settings.gravity))
 
 
 SHEAR = LoadingPath(shear, 0.25, plates=("top",))
 SOFT = LoadingPath(shear, 0.25, plates=("top",), settings=DemSettings(normal_stiffness=1.6e6))
 RISING = LoadingPath(load_isotropically, 0.0, measured=("top", "right"), settings=DemSettings(normal_stiffness=2e8))
+STIFF = DemSettings(normal_stiffness=2e8)
 SOFTER = replace(SOFT, settings=DemSettings(normal_stiffness=3e5))
 HEAP = DemSettings(pressure=float("nan"), gravity=(0.0, -9.81), normal_stiffness=2e6)
 DISCS = DemSettings(normal_stiffness=4e5, friction=0.3, wall_friction=0.3, base_friction=10.0)
@@ -271,6 +256,17 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
         "a box with a free surface tilts by 1° a photograph; no plate",
         TILTED,
     ),
+    "stiff_annulus": Scenario(
+        "a core turns by .005 rad a photograph in a ring under pressure; contacts ten times as stiff, so that overlaps "
+        "are far below the noise",
+        replace(TURNED, step=0.005, settings=STIFF),
+    ),
+    "stiff_tiny_cycles": Scenario("tiny cycles; contacts ten times as stiff", replace(TINY, settings=STIFF)),
+    "stiff_stepped_loads": Scenario("stepped loads; contacts ten times as stiff", replace(STEPPED, settings=STIFF)),
+    "pins": Scenario("sheared; one rod in twenty is stated as boundary", MOVED, state_pins),
+    "stepped_pins": Scenario("stepped loads; boundary as in `pins`", STEPPED, state_pins),
+    "tilted_pins": Scenario("tilted bed; boundary as in `pins`", TILTED, state_pins),
+    "cycles_pins": Scenario("tiny cycles; boundary as in `pins`", TINY, state_pins),
     "power_law": Scenario("sheared; radii 1:6, most of them small", replace(MOVED, sizes=_choose_by_power_law)),
     "moving": Scenario(
         "sheared, photographed while it moves: rods without contact are not at rest",

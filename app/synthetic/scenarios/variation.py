@@ -14,7 +14,8 @@ import numpy as np
 from ...solver.dem.dem_truth import DemSettings
 from ..dense_packing import choose_radii, choose_two_radii, choose_wide_radii
 from .preset_names import ScenarioName
-from .scenario_table import SCENARIOS, Scenario
+from .scenario import Scenario
+from .scenario_table import SCENARIOS
 
 VARIED = 3  # second word of a seed, beside those of `scenario_folder`
 STEPS = 0.4, 2.5  # factors of the step …
