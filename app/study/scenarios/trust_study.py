@@ -78,8 +78,7 @@ PREDICTED_BY = {
 # Least and greatest value of each measure: beyond them no more is known.
 RANGES = {
     "disagreement_of_estimates": (0.02, 1.0), "disagreement_with_either": (0.03, 1.0),
-    "correction": (0.02, 2.0),
-    "previous_residual": (0.004, 0.2),
+    "correction": (0.02, 2.0), "previous_residual": (0.004, 0.2),
     "disagreement_of_members": (0.05, 1.0), "gap_error": (1e-4, 5e-3), "force_change": (0.01, 0.6),
     "power_gap": (0.01, 1.5), "disagreement_of_positions": (0.003, 1.0), "hidden_sliding": (0.03, 10.0),
     "load_mismatch": (0.02, 2.0), "force_residual": (0.002, 0.5), "inertial_number": (1e-3, 0.1),
