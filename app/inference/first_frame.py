@@ -19,7 +19,7 @@ from ..solver.calibration.grain_errors import find_grain_errors
 from ..solver.contacts.verdicts import NO_VERDICTS
 from ..solver.frame_forces import FrameForces, FrameStatus
 from ..solver.mixture.fringe_evidence import calibrate_sequence_fringes
-from ..solver.mixture.position_estimates import frame_generator, infer_alone
+from ..solver.mixture.position_estimates import PositionEstimates, frame_generator
 from ..solver.posterior.frame_posterior import FramePosterior, infer_frame
 from ..solver.posterior.sequence_evidence import SequenceEvidence
 from ..tracks import Tracks, WallTracks
@@ -56,7 +56,7 @@ def estimate_first_frame(
     found = _posterior_without_errors(sequence, frames)
     evidence = ["errors of its grains' centres and radii are known from later photographs"] if found is not None else []
     if found is None:
-        found = _posterior_of_positions(sequence, sequence.tracks)
+        found = _posterior_of_positions(sequence)
     if found is None or not found.fn.any():
         return None
     if len(frames) > 1 and frames[1].status not in UNSOUND:
@@ -67,10 +67,16 @@ def estimate_first_frame(
     return found, "; ".join(evidence)
 
 
-def _posterior_of_positions(sequence: CorrectedSequence, tracks: Tracks) -> FramePosterior | None:
+def _posterior_of_positions(sequence: CorrectedSequence) -> FramePosterior | None:
     """Position-only estimate of the first frame; None where no two bodies are close."""
+    if sequence.settings.soft and sequence.tracks.fringes is None:  # averaged with later ones, as those of all frames
+        settings, verdicts = sequence.settings, sequence.verdicts.get(0, NO_VERDICTS)
+        estimates = PositionEstimates(
+            sequence.packing, sequence.snapshots, settings.posterior, settings.workers, alone=True
+        )  # fmt: skip
+        return estimates.at(0, verdicts)
     try:
-        evidence = gather_evidence_of(sequence, tracks, soft=_rests_on_positions(sequence))
+        evidence = gather_evidence_of(sequence, sequence.tracks)
     except ValueError:  # no two bodies are close
         return None
     return _sample(sequence, evidence, None)
@@ -105,15 +111,8 @@ def _sample(
         return None
     if gap_sd is not None:
         first = replace(first, gap_sd=gap_sd)
-    workers = sequence.settings.workers
-    if _rests_on_positions(sequence):
-        return infer_alone(first, evidence.settings, frame_generator(0), workers)
-    return infer_frame(first, evidence.settings.for_isolated_frame(), frame_generator(0), workers)
-
-
-def _rests_on_positions(sequence: CorrectedSequence) -> bool:
-    """Whether forces follow from overlaps without fringes."""
-    return sequence.settings.soft and sequence.tracks.fringes is None
+    settings = evidence.settings.for_isolated_frame()
+    return infer_frame(first, settings, frame_generator(0), sequence.settings.workers)
 
 
 def _without_own_corrections(tracks: Tracks, walls: WallTracks, calibration: Calibration) -> Tracks:

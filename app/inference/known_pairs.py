@@ -46,10 +46,10 @@ def rows_of(frame: int, contacts: Contacts) -> GapRows:
     )
 
 
-def gather_evidence_of(sequence: CorrectedSequence, tracks: Tracks, *, soft: bool = False) -> SequenceEvidence:
-    """Position evidence of these tracks, everything else as in the sequence; soft: forces follow from overlaps."""
+def gather_evidence_of(sequence: CorrectedSequence, tracks: Tracks) -> SequenceEvidence:
+    """Position evidence of these tracks, everything else as in the sequence."""
     other = sequence.with_tracks(tracks)
-    return gather_position_evidence(other.packing, other.snapshots, sequence.settings.posterior, soft=soft)
+    return gather_position_evidence(other.packing, other.snapshots, sequence.settings.posterior)
 
 
 def correct_grain_errors(tracks: Tracks, measured: MeasuredSequence, found: GrainErrors) -> Tracks:

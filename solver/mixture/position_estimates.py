@@ -1,6 +1,7 @@
 """Position-only estimates of a sequence, computed frame by frame on demand.
 
-Gathering the evidence of all frames takes as long as a frame or two; it is done at the first request.
+Gathering the evidence of all frames takes as long as a frame or two; it is done at the first request. Where forces rest
+on positions alone, those of a frame are averaged with those of its neighbours, so that these are estimated as well.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from ..posterior.frame_posterior import FramePosterior, infer_frame
 from ..posterior.fringe_calibration import FringeCalibration
 from ..posterior.posterior_settings import PosteriorSettings
 from ..posterior.sequence_evidence import SequenceEvidence, gather_position_evidence
+from .force_smoothing import WINDOW, smooth_forces
 from .fringe_evidence import calibrate_sequence_fringes
 
 STEADY_LOAD = 0.1  # relative change of a load, beyond which photographs share no estimate
@@ -57,15 +59,17 @@ class PositionEstimates:
             Photographs so close together that they share one posterior, that of the first of every so many; where a
             measured load changes by more than a tenth, the next ones begin.
         alone : bool
-            Whether forces rest on positions alone, as those of soft grains: balance then counts more.
+            Whether forces rest on positions alone, as those of soft grains: balance then counts more, and every
+            photograph has its own posterior, whose forces are averaged with those of its neighbours.
         """
         self._workers = workers
         self._packing, self._snapshots, self._settings = packing, snapshots, settings
         self._evidence: SequenceEvidence | None = None
         self._alone = alone
-        self._shared = _shared_frames(snapshots, alike)
+        self._shared = _shared_frames(snapshots, 1 if alone else alike)
         self._fringes: FringeCalibration | None = None
         self._known: dict[int, FramePosterior | None] = dict(given or {})
+        self._single: dict[int, FramePosterior | None] = {}  # of the neighbours of a frame, without verdicts
 
     def at(self, k: int, verdicts: Verdicts = NO_VERDICTS) -> FramePosterior | None:
         """Return the posterior of frame k with its reviewed pairs; None where no two bodies are near."""
@@ -73,7 +77,7 @@ class PositionEstimates:
             k = self.frame_of(k, verdicts)
         if k not in self._known:
             # Only the last one is kept: a frame is requested again only while it is being solved.
-            self._known = {k: self._infer(k, verdicts)}
+            self._known = {k: self._smooth(k, verdicts) if self._alone else self._infer(k, verdicts)}
         return self._known[k]
 
     def frame_of(self, k: int, verdicts: Verdicts = NO_VERDICTS) -> int:
@@ -84,6 +88,18 @@ class PositionEstimates:
     def fringes(self) -> FringeCalibration | None:
         """Calibration of the fringes, once a frame has been estimated; None: no photoelastic photographs."""
         return self._fringes
+
+    def _smooth(self, k: int, verdicts: Verdicts) -> FramePosterior | None:
+        """Average the forces of frame k with those of its neighbours, which are kept for the next request."""
+        near = range(max(k - WINDOW, 0), min(k + WINDOW + 1, len(self._snapshots)))
+        self._single = {f: self._single[f] if f in self._single else self._infer(f, NO_VERDICTS) for f in near}
+        window = dict(self._single)
+        if verdicts is not NO_VERDICTS:
+            window[k] = self._infer(k, verdicts)
+        own, known = window[k], [f for f in near if window[f] is not None]
+        if own is None:
+            return None
+        return smooth_forces([each for each in window.values() if each is not None], known.index(k), verdicts.forced)
 
     def _infer(self, k: int, verdicts: Verdicts) -> FramePosterior | None:
         if self._evidence is None:

@@ -8,8 +8,11 @@ import numba
 import numpy as np
 import pytest
 from rodsight.solver.contacts.verdicts import Verdicts
-from rodsight.solver.mixture.position_estimates import PositionEstimates
+from rodsight.solver.mixture.force_smoothing import WINDOW, smooth_forces
+from rodsight.solver.mixture.position_estimates import PositionEstimates, frame_generator, infer_alone
 from rodsight.solver.posterior.posterior_settings import PosteriorSettings
+from rodsight.solver.posterior.sequence_evidence import gather_position_evidence
+from rodsight.solver.statistics.agreement import compare_forces
 from rodsight.solver.statistics.balance import grain_unbalance
 
 from tests.solver.posterior.simulated import SimulatedShear, simulate_shear
@@ -50,6 +53,39 @@ def test_forces_of_positions_alone_are_nearer_to_balance_and_no_more_certain(sof
     ]
     assert unbalance[1] < 0.8 * unbalance[0]
     assert float(np.median(alone.fn_sd)) > 0.7 * float(np.median(beside.fn_sd))
+
+
+def test_errors_of_photographs_are_averaged_where_forces_rest_on_positions_alone() -> None:
+    noise, rng = 4e-4, np.random.default_rng(5)  # [m], more than the mean overlap
+    world = simulate_shear(0.01, 8, normal_stiffness=2e5)
+    seen = [
+        replace(each, position=each.position + rng.normal(0.0, noise, each.position.shape), sigma=noise)
+        for each in world.snapshots
+    ]
+    estimates = PositionEstimates(world.packing, seen, SWEEPS, alone=True, alike=4)
+    evidence = gather_position_evidence(world.packing, seen, SWEEPS, soft=True)
+    single = [infer_alone(evidence.of_frame(k), evidence.settings, frame_generator(k)) for k in range(len(seen))]
+    for k in (0, 5, 7):
+        found, near = estimates.at(k), single[max(k - WINDOW, 0) : k + WINDOW + 1]
+        assert found is not None
+        assert np.array_equal(found.fn, smooth_forces(near, min(k, WINDOW), np.empty(0, np.int64)).fn)
+        r = [
+            compare_forces(each.contacts.key, np.column_stack([each.fn, each.ft]), *world.truth(k)).r_fn
+            for each in (single[k], found)
+        ]
+        assert r[1] > r[0] + 0.004  # .007 to .010
+    doubtful = int(np.argmin(np.abs(single[7].bearing_probability - 0.5)))
+    verdicts = Verdicts(forced=single[7].contacts.key[doubtful : doubtful + 1])
+    judged, again = (
+        PositionEstimates(world.packing, seen, SWEEPS, alone=True).at(7, each)
+        for each in (verdicts, Verdicts(reset=True))
+    )
+    own = infer_alone(evidence.of_frame(7, verdicts=verdicts), evidence.settings, frame_generator(7))
+    assert judged is not None
+    assert again is not None
+    row = int(np.flatnonzero(own.contacts.key == verdicts.forced)[0])
+    assert judged.fn[row] == own.fn[row]
+    assert len({own.fn[row], again.fn[row], single[7].fn[doubtful]}) == 3
 
 
 def test_given_posteriors_are_used_as_they_are(soft) -> None:
