@@ -73,11 +73,12 @@ def _move_into(source: Path, target: Path) -> None:
             os.replace(each, target / each.name)
 
 
-def write_atomically(file: Path, content: bytes) -> None:
+def write_atomically(file: Path, *parts: bytes | memoryview) -> None:
     """Replace a file by these bytes. Raises OSError with the name of the file that could not be written."""
     with replacing(file) as part:
         try:
-            part.write_bytes(content)
+            with part.open("wb") as stream:
+                stream.writelines(parts)
         except OSError as error:
             if error.filename is None:  # an error of write() carries no name
                 error.filename = str(part)

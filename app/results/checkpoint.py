@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, fields, is_dataclass
 from enum import IntEnum
@@ -78,14 +78,14 @@ class Checkpoint:
     def save(self, frame: int, *values: Any) -> None:
         """Store dataclasses of arrays and numbers as one frame."""
         content = pack({f"{k}.{name}": array for k, value in enumerate(values) for name, array in flatten(value)})
-        write_atomically(self._file(frame), self._checksum(frame, content) + content)
+        write_atomically(self._file(frame), self._checksum(frame, content), *content)
 
     def load(self, frame: int, *kinds: type) -> list[Any]:
         """Return the dataclasses of a frame. Raises RunError where the frame is damaged."""
         content = self._content(frame)
         if content is None:
             raise RunError(f"{self._file(frame)}: was damaged during the run; run the same command again")
-        arrays = unpack(content)
+        arrays = unpack(content, tuple(f"{k}." for k in range(len(kinds))))
         return [restore(kind, arrays, f"{k}.") for k, kind in enumerate(kinds)]
 
     def has(self, frame: int) -> bool:
@@ -95,13 +95,14 @@ class Checkpoint:
     def find(self, frame: int, kind: type[T]) -> T | None:
         """Return the first dataclass of a frame; None where the frame is missing or damaged."""
         content = self._content(frame) if self.has(frame) else None
-        return None if content is None else restore(kind, unpack(content), "0.")
+        return None if content is None else restore(kind, unpack(content, ("0.",)), "0.")
 
     def lazy_sequences(self, count: int, *kinds: type) -> tuple[LazySequence[Any], ...]:
         """Return the first `count` frames as one sequence per kind, read on access."""
 
         def make(frame: int) -> tuple[list[Any], int]:
-            return self.load(frame, *kinds), self._file(frame).stat().st_size
+            found = self.load(frame, *kinds)
+            return found, sum(array.nbytes for each in found for _, array in flatten(each))
 
         loaded = CachedSequence(count, make, itemgetter(1), CACHE_SIZE)
         return tuple(LazySequence(count, lambda frame, at=at: loaded[frame][0][at]) for at in range(len(kinds)))
@@ -118,20 +119,21 @@ class Checkpoint:
         with suppress(OSError):
             self.folder.parent.rmdir()
 
-    def _content(self, frame: int) -> bytes | None:
+    def _content(self, frame: int) -> memoryview | None:
         """Return the content of a frame; None if its checksum is wrong. An unchanged file is checked once."""
         path = self._file(frame)
-        stat, whole = path.stat(), path.read_bytes()
+        stat, whole = path.stat(), memoryview(path.read_bytes())
         content, state = whole[CHECKSUM:], (stat.st_size, stat.st_mtime_ns)
         if self._sound.get(frame) != state:
-            if whole[:CHECKSUM] != self._checksum(frame, content):
+            if whole[:CHECKSUM] != self._checksum(frame, [content]):
                 return None
             self._sound[frame] = state
         return content
 
-    def _checksum(self, frame: int, content: bytes) -> bytes:
+    def _checksum(self, frame: int, content: Sequence[bytes | memoryview]) -> bytes:
         found = hashlib.sha256(f"{FORMAT} {self._fingerprint} {frame} ".encode())
-        found.update(content)
+        for part in content:
+            found.update(part)
         return found.digest()
 
     def _file(self, frame: int) -> Path:
