@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from ..bodies.cell import Cell
 from ..bodies.disc_pairs import find_disc_pairs
 from ..bodies.grains import Array, Grains, move_freely
-from ..bodies.wall_shapes import DEEPEST, Sides, distance_from_walls, faces_walls
+from ..bodies.wall_shapes import faces_walls
 from ..bodies.walls import Walls
 from ..quantity import Quantity
 from .pairs import Keys, make_keys, split_keys
+from .wall_kernels import find_near_walls, measure_at_wall
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,21 +141,20 @@ def measure_contacts(
         order = np.argsort(key, kind="stable")
         i, j = i[order], j[order]
     normal, gap, point, shift = np.empty((len(i), 2)), np.empty(len(i)), np.empty((len(i), 2)), None
-    wall = np.flatnonzero(j >= n)
-    distance, normal[wall] = _from_walls(grains.radius, position, walls, i[wall], j[wall] - n)
-    gap[wall] = distance - grains.radius[i[wall]]
     if walls.cell is not None:
         pair, shift = j < n, np.zeros((len(i), 2))
         shift[pair] = walls.cell.shift(position[j[pair]] - position[i[pair]])
-    row = _measure(i, j, position, grains.radius, np.empty((0, 2)) if shift is None else shift, gap, normal, point)
+    moved, bounds = np.empty((0, 2)) if shift is None else shift, (walls.endpoints, walls.sides)
+    row = _measure(i, j, position, grains.radius, moved, bounds, gap, normal, point)
     if row >= 0:
         raise ValueError(f"grains {i[row]} and {j[row]} have the same centre")
     return Contacts(i, j, gap, normal, point, n, walls.count, shift)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _measure(i, j, position, radius, shift, gap, normal, point):  # type: ignore[no-untyped-def]
-    """Set gap, normal and point of the pairs, of walls only the point; return a row of zero distance, or −1."""
+def _measure(i, j, position, radius, shift, walls, gap, normal, point):  # type: ignore[no-untyped-def]
+    """Set gap, normal and point of the pairs; walls: endpoints and shapes. Return a row of zero distance, or −1."""
+    endpoints, side = walls
     for c in range(len(i)):
         a, b = i[c], j[c]
         if b < len(radius):
@@ -167,6 +167,12 @@ def _measure(i, j, position, radius, shift, gap, normal, point):  # type: ignore
                 return c
             normal[c, 0], normal[c, 1] = x / distance, y / distance
             gap[c] = distance - radius[a] - radius[b]
+        else:
+            w = b - len(radius)
+            distance, normal[c, 0], normal[c, 1] = measure_at_wall(
+                endpoints[w], side[w], position[a, 0], position[a, 1], radius[a]
+            )
+            gap[c] = distance - radius[a]
         arm = radius[a] + 0.5 * gap[c]
         point[c, 0], point[c, 1] = position[a, 0] + normal[c, 0] * arm, position[a, 1] + normal[c, 1] * arm
     return -1
@@ -202,29 +208,16 @@ def _wall_pairs(
     radius: Array, position: Array, present: NDArray[np.bool_], walls: Walls, threshold: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Find pairs of grain and wall; the grain faces it, a straight one for a radius past its ends, or is at an end."""
-    gap = distance_from_walls(walls.endpoints[None], _row(walls.side), position[:, None]) - radius[:, None]
-    near = (gap < threshold) & (gap > -DEEPEST * radius[:, None]) & present[:, None]
+    near = np.empty((len(radius), walls.count), np.bool_)
+    beside = find_near_walls(position, radius, present, walls.endpoints, walls.sides, threshold, near)
     i, w = np.nonzero(near)
+    if beside:
+        return i, w
     faces = faces_walls(walls.endpoints, walls.side, w, position[i], radius[i])
     if not faces.all():
         ends = walls.nearest_ends(w, position[i], radius[i])
         faces |= ends.touched & (ends.distance - radius[i] < threshold)
     return i[faces], w[faces]
-
-
-def _from_walls(
-    radius: Array, position: Array, walls: Walls, i: NDArray[np.int32], w: NDArray[np.int32]
-) -> tuple[Array, Array]:
-    """Distance (c,) [m] of grains i from walls w, or from the ends that they touch, and the outward normals (c, 2)."""
-    distance, normal = walls.distance(w, position[i])
-    ends = walls.nearest_ends(w, position[i], radius[i])
-    if not ends.touched.any():
-        return distance, normal
-    return np.where(ends.touched, ends.distance, distance), np.where(ends.touched[:, None], ends.normal, normal)
-
-
-def _row(side: Sides) -> Sides:
-    return None if side is None else side[None]
 
 
 class ContactState(IntEnum):

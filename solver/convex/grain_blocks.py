@@ -46,8 +46,8 @@ def block_balance(matrix: sparse.csr_matrix, load: Array, grain_count: int, cont
     pair = entries.col.astype(np.int64) % contacts * count + node[entries.row]  # beyond 32 bits from 50 000 grains on
     block, place = np.unique(pair, return_inverse=True)
     contact, node_of_block = block // count, block % count
-    jacobian = np.zeros((len(block), JACOBIAN_SIZE))
-    np.add.at(jacobian, (place, entries.col // contacts * PADDED_ROWS + component[entries.row]), entries.data)
+    at = place * JACOBIAN_SIZE + entries.col // contacts * PADDED_ROWS + component[entries.row]
+    jacobian = np.bincount(at, entries.data, len(block) * JACOBIAN_SIZE).reshape(-1, JACOBIAN_SIZE)
 
     block_count = np.bincount(contact, minlength=contacts)
     coupled = [np.flatnonzero(contact[d:] == contact[: len(contact) - d]) for d in range(1, block_count.max(initial=1))]
@@ -55,7 +55,7 @@ def block_balance(matrix: sparse.csr_matrix, load: Array, grain_count: int, cont
     second = np.concatenate([*(each + d for d, each in enumerate(coupled, start=1)), np.zeros(0, np.int64)])
     pattern = find_pattern(count, node_of_block[first], node_of_block[second])
 
-    order = np.lexsort((pattern.place[node_of_block], contact))
+    order = np.argsort(contact * count + pattern.place[node_of_block])
     node_of_block, jacobian = node_of_block[order], jacobian[order]
     jacobian_start, entry_start = _starts(block_count), _starts(block_count * (block_count + 1) // 2)
     entry = np.empty(entry_start[-1], np.int64)

@@ -43,12 +43,8 @@ class Pattern(NamedTuple):
         ValueError
             If a pair is not coupled.
         """
-        first, second = self.place[a], self.place[b]
-        low, high = np.minimum(first, second), np.maximum(first, second)
-        key = self.column * self.node_count + self.row
-        wanted = low * self.node_count + high
-        found = np.minimum(np.searchsorted(key, wanted), len(key) - 1) if len(key) else np.zeros(0, np.int64)
-        if len(found) != len(wanted) or np.any(key[found] != wanted):
+        found = np.empty(len(a), np.int64)
+        if not _locate(self.start, self.row, self.place[a], self.place[b], found):
             raise ValueError("a pair of nodes is not coupled in this pattern")
         return found
 
@@ -94,6 +90,25 @@ def _order_by_degree(graph) -> Ids:  # type: ignore[no-untyped-def]
         options={"SymmetricMode": True},
     )  # fmt: skip
     return factor.perm_c.astype(np.int64)
+
+
+@njit(cache=True)
+def _locate(start, row, first, second, found):  # type: ignore[no-untyped-def]
+    """Set the entries of pairs of places by bisection of their columns; return whether the pattern has all of them."""
+    for c in range(len(found)):
+        wanted, column = max(first[c], second[c]), min(first[c], second[c])
+        low, end = start[column], start[column + 1]
+        high = end
+        while low < high:
+            middle = (low + high) // 2
+            if row[middle] < wanted:
+                low = middle + 1
+            else:
+                high = middle
+        if low == end or row[low] != wanted:
+            return False
+        found[c] = low
+    return True
 
 
 @njit(cache=True)

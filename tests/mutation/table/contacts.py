@@ -8,9 +8,14 @@ MUTANTS = [
     *mutants_of(
         "solver/contacts/contacts.py",
         "tests/solver/bodies/test_wall_shapes.py",
-        ("np.where(ends.touched, ends.distance, distance)", "distance"),
         ("faces |= ends.touched & ", "faces |= False & "),
-        ("(gap > -DEEPEST * radius[:, None])", "(gap > -radius[:, None])"),
+    ),
+    *mutants_of(
+        "solver/contacts/wall_kernels.py",
+        ("tests/solver/bodies/test_wall_shapes.py", "tests/solver/contacts/test_wall_kernels.py"),
+        ("return apart, away_x / apart, away_y / apart", "return distance, v, -u"),
+        ("gap > -DEEPEST * radius[a]", "gap > -radius[a]"),
+        ("beside = beside and 0.0 < along < length", "pass"),
     ),
     *mutants_of(
         "solver/contacts/contacts.py",

@@ -28,7 +28,7 @@ MUTANTS = [
         (PROGRAM, TWIN),
         ("entries.col // contacts * PADDED_ROWS + component[entries.row]", "component[entries.row]"),
         ("for d in range(1, block_count.max(initial=1))]", "for d in range(1, min(2, block_count.max(initial=1)))]"),
-        ("np.lexsort((pattern.place[node_of_block], contact))", "np.arange(len(contact))"),
+        ("np.argsort(contact * count + pattern.place[node_of_block])", "np.arange(len(contact))"),
         ("by_node[pattern.place[node], component] = load", "by_node[node, component] = load"),
         ("grain_count + rest // ROWS", "grain_count + rest // ROWS * 0"),
     ),
