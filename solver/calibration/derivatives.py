@@ -78,7 +78,8 @@ def _multiply(first, second, own, other, column, value, grains, shared, out):  #
         for a in range(OF_GRAIN):
             total += own[c, a] * grains[i, a] + other[c, a] * grains[j, a]
         for s in range(column.shape[1]):
-            total += value[c, s] * shared[column[c, s]]
+            if value[c, s] != 0.0:  # most are zero
+                total += value[c, s] * shared[column[c, s]]
         out[c] = total
 
 
@@ -90,4 +91,5 @@ def _multiply_transposed(first, second, own, other, column, value, v, grains, sh
             grains[i, a] += own[c, a] * v[c]
             grains[j, a] += other[c, a] * v[c]
         for s in range(column.shape[1]):
-            shared[column[c, s]] += value[c, s] * v[c]
+            if value[c, s] != 0.0:
+                shared[column[c, s]] += value[c, s] * v[c]

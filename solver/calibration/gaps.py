@@ -160,18 +160,14 @@ def measure_gaps(
     g = |x_j − x_i| − R_i − R_j, with the nearest image in a cell; at a wall g = distance of its face − R_i.
     """
     n = len(radius)
-    k, i, wall = rows.frame, rows.i, rows.with_wall(n)
     gap, normal, along = np.empty(rows.count), np.empty((rows.count, 2)), np.zeros(rows.count)
     lattice = np.empty((0, 2, 2)) if cell is None else np.stack([reduce_vectors(each)[1] for each in cell])
-    _measure_pairs(k, i, rows.j, position, radius, lattice, np.linalg.inv(lattice), gap, normal)
-    kw, w, at = k[wall], rows.j[wall] - n, position[k[wall], i[wall]]
-    shape = all_sides(side, endpoints.shape[1])[w]
-    curved = shape != STRAIGHT
-    depth, outward = wall_distance(endpoints[kw, w], shape, at)
-    direction = np.stack([-outward[:, 1], outward[:, 0]], axis=1)
-    # A circle that is rotated about its middle does not change.
-    along[wall] = np.where(curved, 0.0, np.einsum("mk,mk->m", at - endpoints[kw, w].mean(axis=1), direction))
-    gap[wall], normal[wall] = depth - radius[i[wall]], outward
+    _measure_pairs(
+        rows.frame, rows.i, rows.j, position, radius, lattice, np.linalg.inv(lattice), gap, normal
+    )  # fmt: skip
+    if endpoints.shape[1]:
+        shape = all_sides(side, endpoints.shape[1])
+        _measure_at_walls(rows.frame, rows.i, rows.j, position, radius, endpoints, shape, gap, normal, along)
     return GapGeometry(gap, normal, along)
 
 
@@ -192,6 +188,31 @@ def _measure_pairs(frame, first, second, position, radius, lattice, inverse, gap
         gap[c] = distance - radius[i] - radius[j]
         far = max(distance, TINY)
         normal[c, 0], normal[c, 1] = x / far, y / far
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _measure_at_walls(frame, grain, second, position, radius, endpoints, side, gap, normal, along):  # type: ignore[no-untyped-def]
+    """Set gaps (m,), normals (m, 2) and places along the wall (m,) of the rows with a wall, as `wall_distance` does."""
+    for c in range(len(gap)):
+        w = second[c] - len(radius)
+        if w < 0:
+            continue
+        k, i = frame[c], grain[c]
+        x, y, ends = position[k, i, 0], position[k, i, 1], endpoints[k, w]
+        u, v = ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
+        length = math.sqrt(u * u + v * v)
+        across_x, across_y = x - (ends[0, 0] + ends[1, 0]) / 2.0, y - (ends[0, 1] + ends[1, 1]) / 2.0
+        if side[w] == STRAIGHT:
+            u, v = u / length, v / length
+            normal[c, 0], normal[c, 1] = v, -u
+            distance = (ends[0, 0] - x) * v + (ends[0, 1] - y) * -u
+            along[c] = across_x * u + across_y * v
+        else:  # a circle that is rotated about its middle does not change
+            apart = math.sqrt(across_x * across_x + across_y * across_y)
+            sign = float(side[w]) if apart > 0.0 else math.nan
+            normal[c, 0], normal[c, 1] = sign * across_x / apart, sign * across_y / apart
+            distance = side[w] * (0.5 * length - apart)
+        gap[c] = distance - radius[i]
 
 
 def _pairs_of_frame(sequence: MeasuredSequence, k: int, reach: float, wall_reach: float) -> tuple[NDArray, NDArray]:

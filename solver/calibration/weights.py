@@ -59,8 +59,15 @@ def weighting_bias(s: Array, sigma: Array) -> Array:
     -----
     β = −∫ σ ξ W(σ ξ/s) φ(ξ) dξ / ∫ W(σ ξ/s) φ(ξ) dξ, φ the standard normal density, from a table in σ/s.
     """
+    return -sigma * np.interp(sigma / s, *_BIAS)
+
+
+def _tabulate_bias() -> tuple[Array, Array]:
+    """Tabulate −β/σ over σ/s, which is never greater than at the final scale."""
     noise = np.linspace(-6.0, 6.0, 241)
-    ratio = np.linspace(0.0, 1.0 / FINAL_SCALE, 41)  # sigma / s is never greater
+    ratio = np.linspace(0.0, 1.0 / FINAL_SCALE, 41)
     weighted = weigh_gaps(ratio[:, None] * noise) * np.exp(-0.5 * noise**2)
-    mean = weighted @ noise / weighted.sum(axis=1)
-    return -sigma * np.interp(sigma / s, ratio, mean)
+    return ratio, weighted @ noise / weighted.sum(axis=1)
+
+
+_BIAS = _tabulate_bias()
