@@ -159,7 +159,6 @@ def measure_gaps(
     -----
     g = |x_j − x_i| − R_i − R_j, with the nearest image in a cell; at a wall g = distance of its face − R_i.
     """
-    n = len(radius)
     gap, normal, along = np.empty(rows.count), np.empty((rows.count, 2)), np.zeros(rows.count)
     lattice = np.empty((0, 2, 2)) if cell is None else np.stack([reduce_vectors(each)[1] for each in cell])
     _measure_pairs(

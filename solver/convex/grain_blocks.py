@@ -47,7 +47,8 @@ def block_balance(matrix: sparse.csr_matrix, load: Array, grain_count: int, cont
     block, place = np.unique(pair, return_inverse=True)
     contact, node_of_block = block // count, block % count
     at = place * JACOBIAN_SIZE + entries.col // contacts * PADDED_ROWS + component[entries.row]
-    jacobian = np.bincount(at, entries.data, len(block) * JACOBIAN_SIZE).reshape(-1, JACOBIAN_SIZE)
+    jacobian = np.asarray(np.bincount(at, entries.data, len(block) * JACOBIAN_SIZE), np.float64)
+    jacobian = jacobian.reshape(-1, JACOBIAN_SIZE)
 
     block_count = np.bincount(contact, minlength=contacts)
     coupled = [np.flatnonzero(contact[d:] == contact[: len(contact) - d]) for d in range(1, block_count.max(initial=1))]

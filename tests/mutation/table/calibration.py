@@ -25,7 +25,7 @@ MUTANTS = [
         "solver/calibration/gaps.py",
         ("tests/solver/calibration/test_gaps.py", *CALIBRATE, SCALE),
         ("gap[c] = distance - radius[i] - radius[j]", "gap[c] = distance - radius[i]"),
-        ("endpoints[kw, w].mean(axis=1)", "endpoints[kw, w, 0]"),
+        ("(ends[0, 0] + ends[1, 0]) / 2.0, y - (ends[0, 1] + ends[1, 1]) / 2.0", "ends[0, 0], y - ends[0, 1]"),
         ("move_freely(sequence.boundary, i, j)", "move_freely(None, i, j)"),
     ),
     *mutants_of(

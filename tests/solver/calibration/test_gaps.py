@@ -2,6 +2,7 @@ import tracemalloc
 from dataclasses import replace
 
 import numpy as np
+from rodsight.solver.bodies.wall_shapes import IN, OUT, STRAIGHT, wall_distance
 from rodsight.solver.calibration.gaps import GapRows, MeasuredSequence, find_gap_rows, measure_gaps
 
 SIDE, PITCH, R = 40, 0.02, 0.009
@@ -60,3 +61,22 @@ def test_boundary_grains_need_not_touch_each_other_nor_walls():
     assert 0 < moves.sum() < everywhere.count
     np.testing.assert_array_equal(np.stack([rows.i, rows.j]), np.stack([everywhere.i, everywhere.j])[:, moves])
     assert replace(sequence, boundary=boundary).thinned(1).boundary is boundary
+
+
+def test_gaps_at_walls_have_the_bits_of_wall_distance():
+    rng = np.random.default_rng(2)
+    position, radius = rng.uniform(-1.0, 1.0, (2, 50, 2)), rng.uniform(0.01, 0.02, 50)
+    position[0, 0] = 0.5 * (ends := rng.uniform(-2.0, 2.0, (2, 3, 2, 2)))[0, 1].sum(axis=0)  # the middle of a circle
+    side, frame, wall = np.array([STRAIGHT, IN, OUT], np.int8), rng.integers(0, 2, 200), rng.integers(0, 3, 200)
+    grain = np.append([0], rng.integers(0, 50, 199))
+    frame[0], wall[0] = 0, 1
+    rows = GapRows(*(each.astype(np.int32) for each in (frame, grain, 50 + wall, np.arange(200))))
+    found = measure_gaps(rows, position, ends, radius, side)
+    place = position[frame, grain]
+    distance, outward = wall_distance(ends[frame, wall], side[wall], place)
+    along = np.stack([-outward[:, 1], outward[:, 0]], axis=1)
+    from_middle = np.einsum("mk,mk->m", place - ends[frame, wall].mean(axis=1), along)
+    assert np.array_equal(found.gap, distance - radius[grain])
+    assert np.array_equal(found.normal, outward, equal_nan=True)
+    assert np.isnan(found.normal[0]).all()
+    assert np.array_equal(found.along, np.where(side[wall] == STRAIGHT, from_middle, 0.0))
