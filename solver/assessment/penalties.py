@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -41,13 +42,15 @@ class Penalty(NamedTuple):
 NO_PENALTY = Penalty(0.0, "")
 
 
-def assess(evidence: Evidence) -> Assessment:
+def assess(evidence: Evidence, penalties: Sequence[Penalty] | None = None) -> Assessment:
     """Assess a frame.
 
     Parameters
     ----------
     evidence : Evidence
         Of the reported field.
+    penalties : sequence of Penalty, optional
+        Those of the evidence, if they are known already.
 
     Returns
     -------
@@ -55,7 +58,7 @@ def assess(evidence: Evidence) -> Assessment:
         Expected correlation with the true f_n and its lower bound T in [0, 1]; NaN where not assessed.
     """
     expected, bound = motion_assessment(evidence)
-    for each in find_penalties(evidence):
+    for each in find_penalties(evidence) if penalties is None else penalties:
         if not each.counted:
             kept = max(1.0 - each.fraction, 0.0)
             expected, bound = kept * expected, kept * bound
@@ -75,9 +78,9 @@ def find_penalties(evidence: Evidence) -> list[Penalty]:
     return sorted((each for each in found if each is not None and each.fraction > 0.0), reverse=True)
 
 
-def describe_penalties(evidence: Evidence) -> str:
-    """Penalties of at least REPORTED in words, the largest first; empty where there is none."""
-    return join_reasons(*(each.words for each in find_penalties(evidence) if each.fraction >= REPORTED))
+def describe_penalties(penalties: Sequence[Penalty]) -> str:
+    """Penalties of at least REPORTED in words, in their order; empty where there is none."""
+    return join_reasons(*(each.words for each in penalties if each.fraction >= REPORTED))
 
 
 def penalise_friction(frame: FrameForces, check: FrictionCheck | None, *, measured: bool = False) -> FrameForces:

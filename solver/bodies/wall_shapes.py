@@ -238,7 +238,7 @@ def bounding_distance(endpoints: Array, side: Sides, point: Array) -> tuple[Arra
     place = point[..., None, :]
     distance, normal = wall_distance(endpoints, side, place)
     past = ~beside_wall(endpoints, side, place, np.zeros(distance.shape))
-    from_ends = np.linalg.norm(endpoints - place[..., None, :], axis=-1).min(axis=-1)
+    from_ends = _distance_from_ends(endpoints, place)
     nearest = np.where(past, from_ends, np.abs(distance)).argmin(axis=-1)[..., None]
     in_front = np.take_along_axis(~past & (distance >= 0.0), nearest, axis=-1)
     alone = (distance < 0.0).sum(axis=-1, keepdims=True) == 1
@@ -270,6 +270,13 @@ def behind_body(endpoints: Array, side: Sides, point: Array) -> NDArray[np.bool_
     """
     place = point[..., None, :]
     return _in_front_of_another(endpoints, side, point, *wall_distance(endpoints, side, place))
+
+
+def _distance_from_ends(endpoints: Array, place: Array) -> Array:
+    """Distance (…) [m] of points (…, 2) from the nearer end of walls (…, 2, 2)."""
+    first, second = endpoints[..., 0, :] - place, endpoints[..., 1, :] - place
+    square = [away[..., 0] ** 2 + away[..., 1] ** 2 for away in (first, second)]
+    return np.sqrt(np.minimum(*square))
 
 
 def _straight(side: Sides) -> NDArray[np.bool_]:

@@ -48,7 +48,10 @@ class _Step:
 
     def place_of(self, contacts: Contacts) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
         """Rows of other contacts (c,) in the visiting order, and which of them exist in the sub-step."""
-        return find_rows(contacts.key, self.contacts.key[self.problem.rows])
+        row, known = find_rows(contacts.key, self.contacts.key)
+        place = np.empty(self.contacts.count, np.intp)
+        place[self.problem.rows] = np.arange(self.contacts.count)
+        return place.take(row), known
 
 
 class SweepRecorder:

@@ -45,7 +45,8 @@ def pose_frame(
         motion = motion_to(snapshot, state.seen, state.time, state.endpoints, state.cell)
     else:
         motion = motion_from(snapshot, snapshots[k + 1]) if k + 1 < len(snapshots) else no_motion(snapshot)
-    return FrameProblem(sequence, k, snapshot, bridged, motion, refined, verdicts)
+    walls = sequence.packing.walls_of(snapshot)
+    return FrameProblem(sequence, k, snapshot, bridged, motion, walls, refined, verdicts)
 
 
 def solve_frame(problem: FrameProblem, state: SequenceState) -> tuple[FrameForces, SequenceState]:

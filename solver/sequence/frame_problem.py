@@ -43,6 +43,7 @@ class FrameProblem:
     snapshot: Snapshot  # of the frame, with stand-ins for lost grains
     bridged: NDArray[np.bool_]  # (n,) which grains only stand in
     motion: FrameMotion  # that leads to the frame
+    walls: Walls  # at the frame, at rest and under their loads
     refined: RefinedBlock | None = None  # that the frame belongs to; None: solved by a single chain
     verdicts: Verdicts = NO_VERDICTS  # on the frame
 
@@ -63,11 +64,6 @@ class FrameProblem:
     def scale_is_open(self) -> bool:
         """Whether nothing shows the scale of the forces, nor how it changes from frame to frame."""
         return not (self.packing.scale_is_known or self.settings.soft or self.snapshot.fringes is not None)
-
-    @property
-    def walls(self) -> Walls:
-        """The walls at the frame, at rest and under their loads."""
-        return self.packing.walls_of(self.snapshot)
 
     @property
     def seen(self) -> NDArray[np.bool_]:

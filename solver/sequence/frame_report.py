@@ -11,7 +11,7 @@ from ..assessment.evidence import Evidence
 from ..assessment.intervals.force_intervals import calibrate_sd
 from ..assessment.intervals.formula_sd import normal_sd, tangential_sd
 from ..assessment.intervals.scale_sd import scale_sd
-from ..assessment.penalties import assess, describe_penalties
+from ..assessment.penalties import assess, describe_penalties, find_penalties
 from ..assessment.status import StatusDecision
 from ..assessment.trust import hidden_fraction, unseen_penalty
 from ..bodies.grains import Array
@@ -59,10 +59,11 @@ def report_frame(
     unbalance = grain_unbalance(
         frame.contacts, frame.fn, frame.ft, problem.packing.weight, problem.seen & problem.packing.grains.free
     )
-    assessed = assess(evidence)
+    penalties = find_penalties(evidence)
+    assessed = assess(evidence, penalties)
     reported = replace(
         frame, trust=assessed.trust, expected_correlation=assessed.expected_correlation,
-        trust_penalties=describe_penalties(evidence), grain_unbalance=unbalance,
+        trust_penalties=describe_penalties(penalties), grain_unbalance=unbalance,
         scale_sd=scale_sd(evidence) if problem.packing.scale_is_known else np.nan,
     )  # fmt: skip
     first = problem.k == 0 and estimate.mixture is not None

@@ -176,7 +176,7 @@ MUTANTS = [
         "solver/nlgs/sweep_record.py",
         "tests/solver/nlgs/test_sweep_record.py",
         ("yield kept + 1 - count", "yield kept - count"),
-        ("find_rows(contacts.key, self.contacts.key[self.problem.rows])", "find_rows(contacts.key, self.contacts.key)"),
+        ("return place.take(row), known", "return row, known"),
     ),
     *mutants_of(
         "solver/nlgs/force_memory.py",

@@ -42,7 +42,7 @@ def with_information(**changes):
 
 def test_without_further_penalties_the_assessment_is_that_of_the_evidence():
     assert assess(ASSESSED) == motion_assessment(ASSESSED)
-    assert describe_penalties(replace(ASSESSED, correction=0.01, disagreement=0.05)) == ""
+    assert describe_penalties(find_penalties(replace(ASSESSED, correction=0.01, disagreement=0.05))) == ""
 
 
 @pytest.mark.parametrize(
@@ -63,15 +63,15 @@ def test_every_penalty_lowers_the_trust_and_states_cause_and_cure(evidence, word
     else:
         sound = assess(ASSESSED)
     assert assess(evidence).trust < sound.trust - 0.01
-    words = describe_penalties(evidence)
+    words = describe_penalties(find_penalties(evidence))
     assert word in words
     assert ":" in words or "(" in words  # the cure
 
 
 def test_a_wide_step_is_named_where_the_force_pattern_is_new():
     wide = replace(ASSESSED, shear=4 * COARSE_STEP, force_change=0.5, correction=0.4)
-    assert describe_penalties(wide).count("moved as by 1° of shear since the photograph before") == 1
-    assert "of shear since" not in describe_penalties(replace(wide, shear=COARSE_STEP))
+    assert describe_penalties(find_penalties(wide)).count("moved as by 1° of shear since the photograph before") == 1
+    assert "of shear since" not in describe_penalties(find_penalties(replace(wide, shear=COARSE_STEP)))
 
 
 def test_penalties_beside_the_evidence_have_their_size():
@@ -86,8 +86,9 @@ def test_penalties_beside_the_evidence_have_their_size():
 def test_forces_that_balance_lacks_are_missing_in_the_correlation():
     unheld = replace(ASSESSED, missing_force=3.0)
     assert assess(unheld) == pytest.approx([0.5 * each for each in assess(ASSESSED)])
-    assert "lack forces of 173 % of all others" in describe_penalties(unheld)
-    assert describe_penalties(replace(ASSESSED, missing_force=1e-4)) == describe_penalties(ASSESSED)
+    assert "lack forces of 173 % of all others" in describe_penalties(find_penalties(unheld))
+    slightly = find_penalties(replace(ASSESSED, missing_force=1e-4))
+    assert describe_penalties(slightly) == describe_penalties(find_penalties(ASSESSED))
 
 
 def test_no_constant_caps_the_trust_of_a_suspect_frame():

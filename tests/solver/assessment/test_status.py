@@ -8,7 +8,7 @@ import pytest
 from rodsight.solver.assessment.evidence import Evidence
 from rodsight.solver.assessment.intervals.formula_sd import normal_sd, tangential_sd
 from rodsight.solver.assessment.motion_information import NO_INFORMATION
-from rodsight.solver.assessment.penalties import describe_penalties
+from rodsight.solver.assessment.penalties import describe_penalties, find_penalties
 from rodsight.solver.assessment.status import (
     CHAIN_UNBALANCED,
     LOAD_FRACTIONS,
@@ -241,4 +241,4 @@ def test_without_a_motion_nothing_is_assessed():
 def test_few_interior_grains_limit_the_trust_and_are_reported(interior, most):
     few = replace(SOUND, interior=interior)
     assert trust(few) <= most < trust(SOUND)
-    assert f"only {interior} grain" in describe_penalties(few)
+    assert f"only {interior} grain" in describe_penalties(find_penalties(few))

@@ -101,3 +101,13 @@ def test_common_pairs_are_found_in_both(key: NDArray[np.int64], other: NDArray[n
 
 def test_union_of_no_sets_is_empty() -> None:
     assert join_keys().tolist() == []
+
+
+def test_rows_are_found_among_many_ascending_keys_in_any_order() -> None:
+    rng = np.random.default_rng(4)
+    former = np.unique(rng.integers(0, 5000, 1000))
+    for key in (former[::3], rng.permutation(former), rng.integers(-10, 5100, 2000), np.array([4999, 5100, 0])):
+        row, known = find_rows(key, former)
+        assert np.array_equal(known, np.isin(key, former))
+        assert np.array_equal(former[row[known]], key[known])
+        assert np.array_equal(row, np.minimum(np.searchsorted(former, key), len(former) - 1))
