@@ -112,7 +112,7 @@ def infer_sequence(
         return limit_for_smoothing(frame) if smoothed else frame
 
     assessed = LazySequence(count, assess)
-    widened = LazySequence(count, lambda k: _widen_statistics(sequence, statistics[k], assessed[k], check))
+    widened = _widen_statistics(sequence, statistics, assessed, check)
     kinematics = _measure_kinematics(sequence)
     results = replace(
         unsolved,
@@ -217,9 +217,19 @@ def _widen_by_second(forces: FrameForces, frames: Sequence[FrameForces]) -> Fram
 
 
 def _widen_statistics(
-    sequence: CorrectedSequence, statistics: FrameStatistics, assessed: FrameForces, check: FrictionCheck | None
-) -> FrameStatistics:
+    sequence: CorrectedSequence,
+    statistics: Sequence[FrameStatistics],
+    assessed: Sequence[FrameForces],
+    check: FrictionCheck | None,
+) -> Sequence[FrameStatistics]:
     """Statistics after the friction check: with another coefficient other contacts slide."""
-    if check is None or check.agrees or assessed.status is FrameStatus.FAILED:
+    if check is None or check.agrees:
         return statistics
-    return widen_for_friction(summarise_frame(sequence, assessed), check.given, check.measured)
+
+    def widen(k: int) -> FrameStatistics:
+        frame = assessed[k]
+        if frame.status is FrameStatus.FAILED:
+            return statistics[k]
+        return widen_for_friction(summarise_frame(sequence, frame), check.given, check.measured)
+
+    return LazySequence(len(statistics), widen)

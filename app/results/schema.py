@@ -137,6 +137,7 @@ KEPT_OFFSET = _rows("sweeps/recorded_offset", "frame_edge", "rows of sweeps with
 ROWS = (CONTACT_OFFSET, SWEEP_COUNT, SWEEP_OFFSET, SWEEP_NUMBER, KEPT_OFFSET)
 
 
+@cache
 def entries(*parts: str) -> tuple[Entry, ...]:
     """Return the datasets of parts (default: all); where two parts have the same path, that of the later part."""
     found: dict[str, Entry] = {} if parts else {each.path: each for each in ROWS}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from jaxtyping import Float
 from numba import njit
@@ -12,6 +10,8 @@ from ..bodies.grains import Array
 
 DISTANCE_EDGES = np.linspace(0.0, 20.0, 41)  # of the bins of distances, in mean diameters
 DISTANCE_BINS = len(DISTANCE_EDGES) - 1
+# Bin by the whole part of the squared distance, in widths of a bin, as floor √x = floor √(floor x); the last: beyond.
+_BIN_OF_SQUARE = np.append(np.sqrt(np.arange(DISTANCE_BINS**2)), DISTANCE_BINS).astype(np.int32)
 FEWEST_PAIRS = 20  # in a bin
 
 
@@ -39,9 +39,11 @@ def correlate_in_space(position: Float[Array, "n 2"], vector: Float[Array, "n 2"
     square = float(np.mean(np.sum(field**2, axis=1)))
     if not square > 0.0:
         return result
-    pairs, total = np.zeros(DISTANCE_BINS, np.int64), np.zeros(DISTANCE_BINS)
+    pairs, total = np.zeros(DISTANCE_BINS + 1, np.int64), np.zeros(DISTANCE_BINS + 1)
     order = np.argsort(place[:, 0], kind="stable")
-    _add_pairs(place[order], field[order], float(DISTANCE_EDGES[-1]), pairs, total)
+    sorted_place, sorted_field = np.ascontiguousarray(place[order].T), np.ascontiguousarray(field[order].T)
+    _add_pairs(sorted_place, sorted_field, float(DISTANCE_EDGES[-1]), _BIN_OF_SQUARE, pairs, total)
+    pairs, total = pairs[:-1], total[:-1]
     enough = pairs >= FEWEST_PAIRS
     result[enough] = total[enough] / (pairs[enough] * square)
     return result
@@ -60,18 +62,18 @@ def correlation_length(correlation: Array) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add_pairs(place, field, reach, pairs, total):  # type: ignore[no-untyped-def]
-    """Count the pairs closer than `reach` in bins of equal width and add up their products; ascending place[:, 0]."""
-    square, scale = reach * reach, len(pairs) / reach
-    for a in range(len(place)):
-        x, y, u, v = place[a, 0], place[a, 1], field[a, 0], field[a, 1]
-        for b in range(a + 1, len(place)):
-            dx = place[b, 0] - x
-            if dx > reach:
-                break
-            dy = place[b, 1] - y
-            distance = dx * dx + dy * dy
-            if distance < square:
-                k = min(int(scale * math.sqrt(distance)), len(pairs) - 1)  # the root may round up to the reach
-                pairs[k] += 1
-                total[k] += u * field[b, 0] + v * field[b, 1]
+def _add_pairs(place, field, reach, bin_of_square, pairs, total):  # type: ignore[no-untyped-def]
+    """Count the pairs in bins of equal width up to `reach`, then one beyond, and add up their products.
+
+    place, field (2, n), with ascending place[0].
+    """
+    scale, last, end = ((len(pairs) - 1) / reach) ** 2, len(bin_of_square) - 1.0, 0
+    for a in range(place.shape[1]):
+        x, y, u, v = place[0, a], place[1, a], field[0, a], field[1, a]
+        while end < place.shape[1] and not place[0, end] - x > reach:
+            end += 1
+        for b in range(a + 1, end):
+            dx, dy = place[0, b] - x, place[1, b] - y
+            k = bin_of_square[int(min(scale * (dx * dx + dy * dy), last))]
+            pairs[k] += 1
+            total[k] += u * field[0, b] + v * field[1, b]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import overload
 
 import numpy as np
@@ -43,12 +44,13 @@ class Cells(Sequence[str]):
         return bool(np.any(self._start == self._end)) if plain else "" in self
 
     def coded(self) -> Iterator[bytes]:
-        """Yield the bytes of the cells; numbers are read from them."""
-        content = self._content
-        for row in range(0, len(self), CELLS):
-            part = slice(row, row + CELLS)
-            for first, end in zip(self._start[part].tolist(), self._end[part].tolist(), strict=True):
-                yield content[first:end]
+        """Return the bytes of the cells one by one; numbers are read from them."""
+        return chain.from_iterable(map(self._coded_from, range(0, len(self), CELLS)))
+
+    def _coded_from(self, row: int) -> list[bytes]:
+        content, part = self._content, slice(row, row + CELLS)
+        ends = zip(self._start[part].tolist(), self._end[part].tolist(), strict=True)
+        return [content[first:end] for first, end in ends]
 
 
 @dataclass(frozen=True, slots=True)

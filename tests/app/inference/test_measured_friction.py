@@ -85,7 +85,7 @@ def test_statistics_are_recomputed_and_less_certain_where_the_motion_contradicts
 
     def after(check: FrictionCheck | None, status: FrameStatus = FrameStatus.SETTLED) -> FrameStatistics:
         sequence = cast(CorrectedSequence, None)
-        return infer_sequence._widen_statistics(sequence, before, replace(frame, status=status), check)
+        return infer_sequence._widen_statistics(sequence, [before], [replace(frame, status=status)], check)[0]
 
     def check(measured: float) -> FrictionCheck:
         return FrictionCheck(0.25, measured, measured - 0.03, measured + 0.03, 1, 3, True, np.ones(3), np.ones(3))
