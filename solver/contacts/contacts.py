@@ -144,7 +144,7 @@ def measure_contacts(
     if walls.cell is not None:
         pair, shift = j < n, np.zeros((len(i), 2))
         shift[pair] = walls.cell.shift(position[j[pair]] - position[i[pair]])
-    moved, bounds = np.empty((0, 2)) if shift is None else shift, (walls.endpoints, walls.sides)
+    moved, bounds = np.empty((0, 2)) if shift is None else shift, (np.ascontiguousarray(walls.endpoints), walls.sides)
     row = _measure(i, j, position, grains.radius, moved, bounds, gap, normal, point)
     if row >= 0:
         raise ValueError(f"grains {i[row]} and {j[row]} have the same centre")
@@ -209,7 +209,8 @@ def _wall_pairs(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Find pairs of grain and wall; the grain faces it, a straight one for a radius past its ends, or is at an end."""
     near = np.empty((len(radius), walls.count), np.bool_)
-    beside = find_near_walls(position, radius, present, walls.endpoints, walls.sides, threshold, near)
+    ends = np.ascontiguousarray(walls.endpoints)
+    beside = find_near_walls(position, radius, present, ends, walls.sides, threshold, near)
     i, w = np.nonzero(near)
     if beside:
         return i, w
