@@ -50,3 +50,5 @@ class Evidence:
     missing_force: float = 0.0
     # Overlap of the mean force over the noise of a position, by the position-only estimate
     shown_overlap: float = math.nan
+    # Σ |ΣF| of the boundary rods inside the packing over Σ |F|: a load that nothing states
+    boundary_reaction: float = 0.0

@@ -1,15 +1,17 @@
-"""The load on a plate that rods glued to it bear as well.
+"""The load that rods of the boundary bear: those glued to a loaded plate, and those inside the packing.
 
 Their contacts with the plate are not part of the model, since the motion of both is given, so that the load is first
 divided by the widths of the rods. The forces that free rods exert on them show what they bear. A few rods of another
 boundary at the end of a plate, as of a membrane, are also held by their neighbours in it: their width is better there.
+
+Rods of the boundary inside a packing, as pins, may bear any part of its load, and nothing states which.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..bodies.grains import Array
+from ..bodies.grains import Array, Grains
 from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts
 from ..statistics.stress import contact_force_vectors
@@ -18,6 +20,7 @@ from .frame_problem import FrameProblem
 AT_PLATE = 0.3  # radii: greatest gap of a boundary rod that is held by the plate: glue is no thinner
 GLUED = 0.3  # fraction of the plate's width, by rods of the boundary, from which on they are glued to it
 LEAST_BORNE = 0.1  # of the load: what is read from less is noise
+INSIDE = 0.5  # |ΣF| over Σ |F| of a boundary rod below which others press on it from all sides
 
 
 def scale_to_load(problem: FrameProblem, walls: Walls, contacts: Contacts, fn: Array, ft: Array) -> float:
@@ -54,3 +57,26 @@ def scale_to_load(problem: FrameProblem, walls: Walls, contacts: Contacts, fn: A
     first, second = at_plate[contacts.i], np.append(at_plate, np.zeros(walls.count, np.bool_))[contacts.j]
     borne = float(along[contacts.j == n + w].sum() + along[second & ~first].sum() - along[first & ~second].sum())
     return float(load[w] / borne) if borne > LEAST_BORNE * load[w] > 0.0 else 1.0
+
+
+def inner_reaction(grains: Grains, contacts: Contacts, fn: Array, ft: Array) -> float:
+    """Compute Σ |ΣF| of the boundary rods inside a packing over the Σ |F| of all contacts; 0 without such rods.
+
+    Parameters
+    ----------
+    grains : Grains
+    contacts : Contacts
+    fn, ft : array (c,)
+        Forces at the contacts [N].
+    """
+    if grains.boundary is None:
+        return 0.0
+    n, vector = grains.count, contact_force_vectors(contacts, fn, ft)
+    size, force, pressing = np.hypot(*vector.T), np.zeros((n, 2)), np.zeros(n)
+    between = contacts.j < n
+    for grain, sign, of in ((contacts.i, -1.0, slice(None)), (contacts.j[between], 1.0, between)):
+        np.add.at(force, grain, sign * vector[of])
+        np.add.at(pressing, grain, size[of])
+    reaction = np.hypot(*force.T)
+    inside = grains.boundary & (reaction < INSIDE * pressing)
+    return float(reaction[inside].sum() / size.sum()) if inside.any() else 0.0

@@ -31,7 +31,7 @@ from ..statistics.agreement import pearson
 from ..statistics.balance import ForceResidual, measure_force_residual
 from ..statistics.packing_area import packing_area
 from ..statistics.stress import love_weber_stress
-from .boundary_load import scale_to_load
+from .boundary_load import inner_reaction, scale_to_load
 from .ensemble import EnsembleState, solve_ensemble
 from .frame_problem import FrameProblem, PositionEstimates
 from .missing_contacts import NO_MISSING, MissingContacts
@@ -158,6 +158,7 @@ def _evidence_of_mixture(problem: FrameProblem, mixed: Estimate, alone: Evidence
         mixed_trust=mixed.mixture.trust,
         position_weight=mixed.mixture.position_weight,
         information=_motion_information(problem, mixed),
+        boundary_reaction=inner_reaction(problem.packing.grains, mixed.contacts, mixed.fn, mixed.ft),
         force_change=_force_change(mixed, state),
     )
 
@@ -275,6 +276,7 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
         assessed=problem.motion.ends_here,
         unseen_fraction=1.0 - float(problem.seen.sum()) / max(problem.sequence.known, 1),
         information=_motion_information(problem, estimate),
+        boundary_reaction=inner_reaction(packing.grains, estimate.contacts, estimate.fn, estimate.ft),
         force_change=_force_change(estimate, state),
         inertial_number=_inertial_number(problem, load),
         power_gap=estimate.power_gap,

@@ -22,6 +22,7 @@ TERMS: dict[str, Callable[[Evidence], float]] = {
     "per_power_gap": lambda e: e.power_gap,
     "per_error": lambda e: math.exp(-2.0 * correlation_score(e)),
     "per_inertia": lambda e: e.inertial_number,
+    "per_reaction": lambda e: e.boundary_reaction,
 }
 
 
@@ -41,12 +42,12 @@ def scale_sd(evidence: Evidence) -> float:
     Notes
     -----
     Of a frame to which no motion leads, the fitted error common to all of its forces. Otherwise
-    σ² = a² + (b ln q)² + (c ε)² + (d p)² + (e (1 − r)/(1 + r))² + (f I)²: q the mean stress of the field over that of
-    the loads, ε the correction of the measured motion beyond that of noise, p the power gap, r the expected correlation
-    and I the inertial number. Wrong input makes part of the load vanish, so that q is far from 1; an anisotropic stress
-    does so, too, and widens σ without need. Fitted on simulated packings (fitted.toml). Where weight alone sets the
-    scale, a wall that presses on the packing may add any force: the standard deviation of the scale among the ensemble
-    members is added.
+    σ² = a² + (b ln q)² + (c ε)² + (d p)² + (e (1 − r)/(1 + r))² + (f I)² + (g R)²: q the mean stress of the field over
+    that of the loads, ε the correction of the measured motion beyond that of noise, p the power gap, r the expected
+    correlation, I the inertial number and R what boundary rods inside the packing bear, over all forces. Wrong input
+    makes part of the load vanish, so that q is far from 1; an anisotropic stress does so, too, and widens σ without
+    need. Fitted on simulated packings (fitted.toml). Where weight alone sets the scale, a wall that presses on the
+    packing may add any force: the standard deviation of the scale among the ensemble members is added.
     """
     members = 0.0 if math.isnan(evidence.scale_disagreement) else evidence.scale_disagreement
     if not evidence.assessed:

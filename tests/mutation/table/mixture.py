@@ -13,6 +13,17 @@ MUTANTS = [
         ("if boundary is None or len(loaded) != 1 or any", "if boundary is None or any"),
         ("or any(packing.material.gravity):", "or False:"),
         (" or radius[at_plate].sum() < GLUED * radius[beside].sum()", ""),
+        ("grains.boundary & (reaction < INSIDE * pressing)", "grains.boundary"),
+        ("(contacts.i, -1.0, slice(None))", "(contacts.i, 1.0, slice(None))"),
+        ("reaction[inside].sum() / size.sum()", "reaction.sum() / size.sum()"),
+    ),
+    *mutants_of(
+        "solver/mixture/estimate_agreement.py",
+        "tests/solver/mixture/test_estimate_agreement.py",
+        ("position_agreement=correlate(geometry, balance)", "position_agreement=correlate(motion, balance)"),
+        ("positions.overlap / sigma if sigma > 0.0", "positions.overlap if sigma > 0.0"),
+        ("agreement_age=before.agreement_age + 1", "agreement_age=evidence.agreement_age + 1"),
+        ("shown_overlap=before.shown_overlap", "shown_overlap=evidence.shown_overlap"),
     ),
     *mutants_of(
         "solver/mixture/frame_mixture.py",

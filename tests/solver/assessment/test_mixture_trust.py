@@ -125,6 +125,13 @@ def test_positions_weigh_more_where_sliding_is_hidden_or_no_forces_of_the_motion
     assert evident_position_weight(replace(given, unbalance=math.nan)) == weight  # not known
 
 
+def test_positions_weigh_less_where_overlaps_are_far_below_their_noise():
+    given = replace(SOUND, correction=0.1, position_agreement=0.9, agreement=0.6, power_gap=0.2, shown_overlap=0.3)
+    for each in (given, replace(given, loaded=False)):
+        assert evident_position_weight(replace(each, shown_overlap=0.03)) < evident_position_weight(each)
+        assert evident_position_weight(replace(each, shown_overlap=math.nan)) == evident_position_weight(each)
+
+
 def test_without_a_load_positions_have_a_weight_of_their_own():
     given = replace(SOUND, correction=0.1, position_agreement=0.9, agreement=0.6, overlap_agreement=0.5, power_gap=0.2)
     without = replace(given, loaded=False)

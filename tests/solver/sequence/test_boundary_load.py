@@ -14,7 +14,7 @@ from rodsight.solver.bodies.packing import Material, Packing
 from rodsight.solver.bodies.walls import Walls
 from rodsight.solver.contacts.pairs import make_keys, match_values
 from rodsight.solver.sequence import frame as frames
-from rodsight.solver.sequence.boundary_load import scale_to_load
+from rodsight.solver.sequence.boundary_load import inner_reaction, scale_to_load
 from rodsight.solver.sequence.frames import solve_sequence
 from rodsight.solver.sequence.settings import SequenceSettings
 
@@ -88,3 +88,20 @@ def test_glued_rods_bear_the_load_wherever_they_stand_in_a_pair():
 )
 def test_without_glued_rods_with_two_loads_or_with_weight_nothing_is_scaled(changed):
     assert scale_to_load(*problem_of(**changed)) == 1.0
+
+
+def test_boundary_rods_inside_a_packing_bear_what_others_press_on_them_from_all_sides():
+    """Two boundary rods: one between two free ones, with 300 N below and 200 N above; one with 50 N from below."""
+    grains = Grains(np.full(5, 0.1), np.ones(5), np.array([False, True, False, True, False]))
+    contacts = SimpleNamespace(
+        i=np.array([0, 1, 3]), j=np.array([1, 2, 4]), normal=np.array([[0.0, 1.0]] * 2 + [[0.0, -1.0]]),
+        tangent=np.array([[-1.0, 0.0]] * 2 + [[1.0, 0.0]]),
+    )  # fmt: skip
+    fn, ft = np.array([300.0, 200.0, 50.0]), np.zeros(3)
+    assert inner_reaction(grains, contacts, fn, ft) == pytest.approx(100.0 / 550.0)
+    sheared = np.array([0.0, 75.0, 0.0])  # along x
+    size = 300.0 + np.hypot(200.0, 75.0) + 50.0
+    assert inner_reaction(grains, contacts, fn, sheared) == pytest.approx(125.0 / size)
+    assert inner_reaction(replace(grains, boundary=None), contacts, fn, ft) == 0.0
+    assert inner_reaction(grains, contacts, fn * [1.0, 0.0, 1.0], ft) == 0.0  # pressed from one side
+    assert inner_reaction(grains, contacts, 0.0 * fn, ft) == 0.0

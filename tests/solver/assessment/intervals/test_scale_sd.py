@@ -16,10 +16,11 @@ CARRIED = replace(ASSESSED, load_fraction=1.0)
 @pytest.mark.parametrize(("load_fraction", "mismatch"), [(1.0, 0.0), (0.5, math.log(2.0)), (math.nan, 0.0)])
 def test_the_terms_add_in_squares(load_fraction, mismatch):
     evidence = replace(ASSESSED, correction=0.3, power_gap=0.5, inertial_number=0.01, load_fraction=load_fraction)
+    evidence = replace(evidence, boundary_reaction=0.02)
     r = expect_correlation(evidence)
     expected = math.hypot(
         TABLE["least"], TABLE["per_load"] * mismatch, 0.3 * TABLE["per_correction"], 0.5 * TABLE["per_power_gap"],
-        TABLE["per_error"] * (1.0 - r) / (1.0 + r), 0.01 * TABLE["per_inertia"],
+        TABLE["per_error"] * (1.0 - r) / (1.0 + r), 0.01 * TABLE["per_inertia"], 0.02 * TABLE["per_reaction"],
     )  # fmt: skip
     assert scale_sd(evidence) == pytest.approx(expected)
 
