@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from ..assessment.evidence import Evidence
@@ -32,6 +33,7 @@ def with_agreements(
         Standard deviation of a position component [m]. Where overlaps are much smaller, positions show which contacts
         bear, not how much.
     """
+    noise = math.hypot(sigma, evidence.corrected_gap)  # corrected errors of grains hide overlaps, too
     geometry = positions.contacts.key, positions.fn
     return replace(
         evidence,
@@ -39,7 +41,7 @@ def with_agreements(
         position_agreement=correlate(geometry, balance),
         overlap_agreement=correlate(motion, balance),
         agreement_age=0,
-        shown_overlap=positions.overlap / sigma if sigma > 0.0 else float("inf"),
+        shown_overlap=positions.overlap / noise if noise > 0.0 else math.inf,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -15,10 +16,11 @@ KEY = np.array([2, 5, 9])
 MOTION, FORCE, BALANCE = np.array([1.0, 2.0, 4.0]), np.array([1.0, 3.0, 2.0]), np.array([3.0, 1.0, 0.0])
 
 
-def agreements(sigma: float):
+def agreements(sigma: float, corrected_gap: float = 0.0):
     """Evidence with the agreements of three estimates on the same pairs; overlap of the mean force: 2 µm."""
     positions = cast("Any", SimpleNamespace(contacts=SimpleNamespace(key=KEY), fn=FORCE, overlap=2e-6))
-    return with_agreements(ASSESSED, (KEY, MOTION), positions, (KEY, BALANCE), sigma)
+    evidence = replace(ASSESSED, corrected_gap=corrected_gap)
+    return with_agreements(evidence, (KEY, MOTION), positions, (KEY, BALANCE), sigma)
 
 
 def test_each_pair_of_estimates_has_its_correlation():
@@ -32,6 +34,7 @@ def test_each_pair_of_estimates_has_its_correlation():
 def test_positions_show_the_overlap_of_the_mean_force_over_their_noise():
     assert agreements(1e-5).shown_overlap == pytest.approx(0.2)
     assert agreements(0.0).shown_overlap == np.inf
+    assert agreements(3e-6, corrected_gap=4e-6).shown_overlap == pytest.approx(0.4)  # corrected errors hide them, too
 
 
 def test_agreements_are_carried_on_with_their_age():
