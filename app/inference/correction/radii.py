@@ -197,7 +197,8 @@ def find_oversized_rods(tracks: Tracks) -> dict[int, float]:
     Notes
     -----
     Pairs count whose overlap is more than DEEP of the smaller radius in more than half of the photographs that are read
-    and show both; no rod is so soft. Of their rods that with the most such pairs is wrong, then of the rest.
+    and show both, which are half of all: no rod is so soft, and a disc that is found now and then may be none. Of their
+    rods that with the most such pairs is wrong, then of the rest.
     """
     grains = grains_of(tracks)
     read = _frames_read(tracks)
@@ -208,7 +209,12 @@ def find_oversized_rods(tracks: Tracks) -> dict[int, float]:
         for row in np.flatnonzero(depth > DEEP).tolist():
             deep.setdefault((int(near.i[row]), int(near.j[row])), []).append(float(depth[row]))
     seen = tracks.present[read]
-    pairs = {pair: max(each) for pair, each in deep.items() if len(each) > 0.5 * seen[:, pair].all(axis=1).sum()}
+    together = {pair: int(seen[:, pair].all(axis=1).sum()) for pair in deep}
+    pairs = {
+        pair: max(each)
+        for pair, each in deep.items()
+        if len(each) > 0.5 * together[pair] and together[pair] >= 0.5 * len(read)
+    }
     found: dict[int, float] = {}
     while pairs:
         count = np.bincount(np.array(list(pairs)).ravel(), minlength=tracks.grain_count)

@@ -32,7 +32,8 @@ MUTANTS = [
     *mutants_of(
         "app/inference/correction/radii.py",
         f"{TESTS}/diagnosis/test_direct_tests.py",
-        ("len(each) > 0.5 * seen[:, pair].all(axis=1).sum()", "len(each)"),
+        ("len(each) > 0.5 * together[pair]", "len(each)"),
+        ("together[pair] >= 0.5 * len(read)", "together[pair]"),
         ("seen[:, pair].all(axis=1).sum()", "len(read)"),
         ("if worst not in pair}", "if False}"),
         ("np.lexsort([tracks.radius, count])[-1]", "np.lexsort([-tracks.radius, count])[0]"),

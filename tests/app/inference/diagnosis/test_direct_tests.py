@@ -282,11 +282,13 @@ def test_a_rod_that_overlaps_others_in_few_photographs_is_no_wrong_radius(photog
     assert bool(find_oversized_rods(replace(tracks, position=position))) == named
 
 
-def test_photographs_without_the_rod_do_not_count():
+@pytest.mark.parametrize(("shown", "named"), [(5, True), (2, False)])
+def test_photographs_without_the_rod_do_not_count_but_few_with_it_show_no_radius(shown, named):
+    """A disc that is found now and then, inside others, may be none: its radius is not to blame."""
     tracks = with_factors(rolling_tracks(), {44: 1.5})
     position, status = tracks.position.copy(), tracks.status.copy()
-    position[2:, 44], status[2:, 44] = np.nan, TrackStatus.LOST
-    assert set(find_oversized_rods(replace(tracks, position=position, status=status))) == {44}
+    position[shown:, 44], status[shown:, 44] = np.nan, TrackStatus.LOST
+    assert bool(find_oversized_rods(replace(tracks, position=position, status=status))) == named
 
 
 def test_fast_shear_is_named():
