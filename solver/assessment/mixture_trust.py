@@ -161,13 +161,24 @@ def evident_position_weight(evidence: Evidence) -> float:
         s = a_0 + a_1 ln ε + a_2 ln(1 − c) + a_3 ln p + a_4 ln D + a_5 (arctanh c − arctanh d)
             + a_6 ln h + a_7 ln u + a_8 arctanh b + a_9 ln o.
 
+    Where o is small, positions show which contacts bear, not how much, and sometimes less than the motion, which no
+    other measure shows: w is at most .6 where o ≤ .06, and 1 from o = .12 on, linear in ln o between.
+
     Errors of single grains that were corrected change gaps as forces do, which makes positions less certain in a way
     that none of these measures shows: without a known load both estimates then count alike.
     """
     if evidence.corrected_gap > 0.0 and not evidence.loaded:
         return ALIKE
     score = float(position_weight_terms(evidence) @ weight_coefficients(loaded=evidence.loaded))
-    return 1.0 / (1.0 + math.exp(-score))
+    return min(1.0 / (1.0 + math.exp(-score)), _most_by_overlap(evidence.shown_overlap))
+
+
+def _most_by_overlap(shown: float) -> float:
+    """Greatest weight of positions that show so much of an overlap, over their noise; NaN: not known."""
+    (low, least), (high, most) = FITTED["position_weight"]["most_by_overlap"]
+    if math.isnan(shown):
+        return most
+    return float(np.interp(math.log(max(shown, low)), np.log([low, high]), [least, most]))
 
 
 def weight_coefficients(*, loaded: bool) -> Array:

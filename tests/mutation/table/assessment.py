@@ -113,6 +113,7 @@ MUTANTS = [
         ("logarithm(1.0 - evidence.position_agreement", "-logarithm(1.0 - evidence.position_agreement"),
         ("math.log(min(max(default if math.isnan(value) else value, low), high))", "math.log(max(value, 1e-9))"),
         ("a * evidence.disagreement**p", "a * evidence.disagreement"),
+        ("np.interp(math.log(max(shown, low)), np.log([low, high])", "np.interp(shown, [low, high]"),
         ("logarithm(evidence.shown_overlap, ", "-logarithm(evidence.shown_overlap, "),
         ("if not evidence.assessed or math.isnan(evidence.correction)", "if math.isnan(evidence.correction)"),
     ),

@@ -132,6 +132,16 @@ def test_positions_weigh_less_where_overlaps_are_far_below_their_noise():
         assert evident_position_weight(replace(each, shown_overlap=math.nan)) == evident_position_weight(each)
 
 
+def test_positions_have_a_limited_weight_where_overlaps_are_far_below_their_noise():
+    strong = replace(SOUND, correction=2.0, position_agreement=0.9, agreement=0.1, power_gap=1.0, disagreement=0.9)
+    least, middle, most = (
+        evident_position_weight(replace(strong, shown_overlap=each)) for each in (0.02, math.sqrt(0.06 * 0.12), 0.3)
+    )
+    assert (least, middle) == (pytest.approx(0.6), pytest.approx(0.8))
+    assert most > 0.9
+    assert evident_position_weight(replace(strong, shown_overlap=math.nan)) > 0.9
+
+
 def test_without_a_load_positions_have_a_weight_of_their_own():
     given = replace(SOUND, correction=0.1, position_agreement=0.9, agreement=0.6, overlap_agreement=0.5, power_gap=0.2)
     without = replace(given, loaded=False)
