@@ -248,7 +248,7 @@ def _term(name: str, table: dict[str, Any], evidence: Evidence) -> float:
 
 def _as_far_as_seen(name: str, value: float, seen: float) -> float:
     """What a measure adds, where a fraction of the sliding is seen."""
-    return seen * value if name in BY_SLIDING and value > 0.0 else value
+    return float(weaken(value, seen)) if name in BY_SLIDING else value
 
 
 def weaken(value: Array | float, strength: Array | float) -> Array:
@@ -286,7 +286,7 @@ def seen_sliding(hidden: Array | np.float64) -> Array:
 def fraction_seen(evidence: Evidence) -> float:
     """Fraction of the sliding that is seen; 1 where that is not known."""
     hidden = MEASURES["hidden_sliding"](evidence)
-    return min(1.0 / hidden - LEAST_SIGNAL, 1.0) if hidden > 0.0 else 1.0
+    return 1.0 if math.isnan(hidden) else float(seen_sliding(np.float64(hidden)))
 
 
 def _logarithm(table: dict[str, Any], measure: float) -> float:

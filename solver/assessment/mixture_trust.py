@@ -162,7 +162,8 @@ def evident_position_weight(evidence: Evidence) -> float:
             + a_6 ln h + a_7 ln u + a_8 arctanh b + a_9 ln o.
 
     Where o is small, positions show which contacts bear, not how much, and sometimes less than the motion, which no
-    other measure shows: w is at most .6 where o ≤ .06, and 1 from o = .12 on, linear in ln o between.
+    other measure shows: w is at most .6 where o ≤ .06, and 1 from o = .12 on, linear in ln o between. Where errors of
+    single grains were corrected, which o contains, nothing limits w.
 
     Errors of single grains that were corrected change gaps as forces do, which makes positions less certain in a way
     that none of these measures shows: without a known load both estimates then count alike.
@@ -170,7 +171,8 @@ def evident_position_weight(evidence: Evidence) -> float:
     if evidence.corrected_gap > 0.0 and not evidence.loaded:
         return ALIKE
     score = float(position_weight_terms(evidence) @ weight_coefficients(loaded=evidence.loaded))
-    return min(1.0 / (1.0 + math.exp(-score)), _most_by_overlap(evidence.shown_overlap))
+    weight = 1.0 / (1.0 + math.exp(-score))
+    return weight if evidence.corrected_gap > 0.0 else min(weight, _most_by_overlap(evidence.shown_overlap))
 
 
 def _most_by_overlap(shown: float) -> float:

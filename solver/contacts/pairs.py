@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 Keys = NDArray[np.int64]
@@ -45,7 +44,7 @@ def are_present(key: Keys, present: NDArray[np.bool_], bodies: int) -> NDArray[n
 
 def are_among(key: Keys, others: Keys) -> NDArray[np.bool_]:
     """Return which pairs (c,) are also in the other set."""
-    return find_rows(key, others)[1]
+    return np.isin(key, others)
 
 
 def join_keys(*keys: Keys) -> Keys:
@@ -64,37 +63,14 @@ def common_rows(key: Keys, others: Keys) -> tuple[NDArray[np.intp], NDArray[np.i
 
 def find_rows(key: Keys, former: Keys) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """Return the row of every pair (c,) in a former set, and whether it is there; otherwise the row is arbitrary."""
-    row, known = np.zeros(len(key), np.intp), np.zeros(len(key), np.bool_)
-    if len(former) and not _find_among_ascending(key, former, row, known):
+    if len(former) == 0:
+        return np.zeros(len(key), np.intp), np.zeros(len(key), np.bool_)
+    if np.all(former[1:] > former[:-1]):
+        row = np.minimum(np.searchsorted(former, key), len(former) - 1)
+    else:
         order = np.argsort(former, kind="stable")
         row = order[np.minimum(np.searchsorted(former, key, sorter=order), len(former) - 1)]
-        known = former[row] == key
-    return row, known
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _find_among_ascending(key, former, row, known):  # type: ignore[no-untyped-def]
-    """Set rows and what is known of `find_rows`; return whether former keys ascend. Fast where keys ascend, too."""
-    for m in range(1, len(former)):
-        if former[m] <= former[m - 1]:
-            return False
-    last, m = len(former) - 1, 0
-    for c in range(len(key)):
-        if c and key[c] < key[c - 1]:
-            m = 0
-        step = 1
-        while m + step <= last and former[m + step] < key[c]:  # in growing steps, then by bisection
-            m += step
-            step *= 2
-        end = min(m + step, last)
-        while m < end:
-            middle = (m + end) // 2
-            if former[middle] < key[c]:
-                m = middle + 1
-            else:
-                end = middle
-        row[c], known[c] = m, former[m] == key[c]
-    return True
+    return row, former[row] == key
 
 
 def match_values(key: Keys, former: Keys, value: NDArray[Any], *, fill: float = 0.0) -> NDArray[Any]:

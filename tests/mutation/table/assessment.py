@@ -82,7 +82,7 @@ MUTANTS = [
             "return bound",
         ),
         ("lambda e: 1.0 - e.agreement", "lambda e: e.agreement"),
-        ("return seen * value if name in BY_SLIDING and value > 0.0 else value", "return value"),
+        ("return float(weaken(value, seen)) if name in BY_SLIDING else value", "return value"),
         ("np.where(np.greater(value, 0.0), strength * value, value)", "np.asarray(strength * value)"),
         ("evidence.correction - CORRECTED_NOISE * (1.0 - seen)", "evidence.correction"),
         ("return min(beyond, seen * evidence.correction)", "return beyond"),

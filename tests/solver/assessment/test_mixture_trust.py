@@ -140,6 +140,7 @@ def test_positions_have_a_limited_weight_where_overlaps_are_far_below_their_nois
     assert (least, middle) == (pytest.approx(0.6), pytest.approx(0.8))
     assert most > 0.9
     assert evident_position_weight(replace(strong, shown_overlap=math.nan)) > 0.9
+    assert evident_position_weight(replace(strong, shown_overlap=0.02, corrected_gap=1e-5)) > 0.7
 
 
 def test_without_a_load_positions_have_a_weight_of_their_own():
