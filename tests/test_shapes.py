@@ -48,7 +48,7 @@ def test_named_tuples_are_checked_too():
     def problem(wall):
         return ContactProblem(
             np.zeros((3, 4)), np.zeros((1, 2)), np.zeros((1, 2, 32), np.int32), np.zeros((1, 5, 32)), 0,
-            np.zeros((2, 2), np.int32), wall, np.zeros(2), np.zeros((3, 2)), np.zeros(4, np.int64),
+            np.zeros((2, 2), np.int32), wall, np.zeros(2), np.zeros((3, 3)), np.zeros(4, np.int64),
         )  # fmt: skip
 
     problem(np.zeros((2, 8)))

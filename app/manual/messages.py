@@ -23,8 +23,8 @@ VALIDATED = "experiment/config/"  # folder where a ValueError reports a wrong ke
 # Functions whose texts are warnings of a frame, a run or an experiment.
 WARNINGS = {
     "solver/assessment/penalties.py": (
-        "_boundary", "_missing_force", "_softness", "_unseen", "_size", "_contradictions", "describe_few_grains",
-        "describe_few_photographs", "penalise_friction",
+        "_boundary", "_inner_boundary", "_missing_force", "_softness", "_unseen", "_size", "_contradictions",
+        "describe_few_grains", "describe_few_photographs", "penalise_friction",
     ),
     "solver/assessment/status.py": ("decide_status", "_decide", "find_faults", "_describe_change"),
     "solver/calibration/calibrate.py": ("_verdict", "_track_warning", "_prior_warning"),

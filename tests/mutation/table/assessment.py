@@ -105,6 +105,11 @@ MUTANTS = [
         ('float(each["value"][BEST_EIGHTH]), seen) - _term', 'float(each["value"][-1]), seen) - _term'),
     ),
     *mutants_of(
+        "solver/assessment/penalties.py",
+        f"{TESTS}/test_penalties.py",
+        ("return Penalty(INNER_BOUNDARY_LOSS, words) if borne > LEAST_BORNE else None", "return None"),
+    ),
+    *mutants_of(
         "solver/assessment/mixture_trust.py",
         MIXTURE_TRUST,
         ("sure * (1.0 - MEAN_ERROR_FRACTION)", "sure * MEAN_ERROR_FRACTION"),

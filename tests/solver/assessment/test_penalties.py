@@ -11,6 +11,7 @@ from rodsight.solver.assessment.motion_information import MotionInformation
 from rodsight.solver.assessment.penalties import (
     BEYOND_WALL_LOSS,
     COARSE_STEP,
+    INNER_BOUNDARY_LOSS,
     SOFT_CHAIN_LOSS,
     assess,
     describe_penalties,
@@ -89,6 +90,13 @@ def test_forces_that_balance_lacks_are_missing_in_the_correlation():
     assert "lack forces of 173 % of all others" in describe_penalties(find_penalties(unheld))
     slightly = find_penalties(replace(ASSESSED, missing_force=1e-4))
     assert describe_penalties(slightly) == describe_penalties(find_penalties(ASSESSED))
+
+
+def test_a_load_that_boundary_grains_inside_the_packing_bear_lowers_the_trust():
+    pinned = replace(ASSESSED, boundary_reaction=0.015)
+    assert assess(pinned) == pytest.approx([(1.0 - INNER_BOUNDARY_LOSS) * each for each in assess(ASSESSED)])
+    assert "inside the packing bear 1.5 % of all forces" in describe_penalties(find_penalties(pinned))
+    assert assess(replace(ASSESSED, boundary_reaction=1e-4)) == assess(ASSESSED)
 
 
 def test_no_constant_caps_the_trust_of_a_suspect_frame():
