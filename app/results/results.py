@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..solver.assessment.fringe_pressures import FringePressures
 from ..solver.assessment.intervals.wall_sensors import compare_wall_forces
-from ..solver.bodies.grains import Array, Grains
+from ..solver.bodies.grains import Array, Grains, move_freely
 from ..solver.bodies.wall_shapes import STRAIGHT, outward_normals
 from ..solver.boundary.boundary_correction import Boundary
 from ..solver.boundary.camera_distortion import CameraDistortion
@@ -46,9 +46,7 @@ class TruthContacts:
         """
         if boundary is None:
             return self
-        of_boundary = np.append(boundary, True)  # the last row stands for all walls
-        n = len(boundary)
-        keep = ~(of_boundary[np.minimum(self.i, n)] & of_boundary[np.minimum(self.j, n)])
+        keep = move_freely(boundary, self.i, self.j)
         return TruthContacts(self.frame[keep], self.i[keep], self.j[keep], self.fn[keep], self.ft[keep])
 
     def by_frame(self, bodies: int, frame_count: int) -> tuple[tuple[Keys, Array], ...]:

@@ -21,9 +21,9 @@ from .trust import Assessment, interior_limit, motion_assessment, unseen_penalty
 COARSE_STEP = math.radians(0.25)  # [rad] shear of a step beyond which forces cannot be followed
 SOFT_CHAIN_LOSS = 0.15  # where a single chain treats soft grains as hard
 BEYOND_WALL_LOSS = 12.0  # for each grain beyond a wall, per grain
-# Where boundary grains inside the packing bear more than LEAST_BORNE of all forces: of T of `pins`, `stepped_pins`,
+# Where boundary grains inside the packing bear more than LEAST_REACTION of all forces: of T of `pins`, `stepped_pins`,
 # `tilted_pins`, `cycles_pins` of seeds 62 to 64 with varied parameters, of which a sixth was above r by more than .03
-INNER_BOUNDARY_LOSS, LEAST_BORNE = 0.04, 1e-3
+INNER_BOUNDARY_LOSS, LEAST_REACTION = 0.04, 1e-3
 STEP_SHOWN_BY = ("previous_residual", "force_change")  # evidence that too large a step explains
 FEW_PHOTOGRAPHS, TRUST_OF_FEW = 3, 0.28  # of a test, below which the trust is at most the second
 TRUST_WITHOUT_LOAD = 0.28  # of a packing with one open side and neither load nor weight: r .3 to .65 in two of them
@@ -287,7 +287,7 @@ def _inner_boundary(evidence: Evidence) -> Penalty | None:
         f"grains of the boundary inside the packing bear {100.0 * borne:.1f} % of all forces, which nothing states: "
         "take those that are free from the boundary"
     )
-    return Penalty(INNER_BOUNDARY_LOSS, words) if borne > LEAST_BORNE else None
+    return Penalty(INNER_BOUNDARY_LOSS, words) if borne > LEAST_REACTION else None
 
 
 def _missing_force(evidence: Evidence) -> Penalty | None:

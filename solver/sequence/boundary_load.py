@@ -14,6 +14,7 @@ import numpy as np
 from ..bodies.grains import Array, Grains
 from ..bodies.walls import Walls
 from ..contacts.contacts import Contacts
+from ..statistics.balance import resultant_norms, sum_on_grains
 from ..statistics.stress import contact_force_vectors
 from .frame_problem import FrameProblem
 
@@ -71,12 +72,7 @@ def inner_reaction(grains: Grains, contacts: Contacts, fn: Array, ft: Array) -> 
     """
     if grains.boundary is None:
         return 0.0
-    n, vector = grains.count, contact_force_vectors(contacts, fn, ft)
-    size, force, pressing = np.hypot(*vector.T), np.zeros((n, 2)), np.zeros(n)
-    between = contacts.j < n
-    for grain, sign, of in ((contacts.i, -1.0, slice(None)), (contacts.j[between], 1.0, between)):
-        np.add.at(force, grain, sign * vector[of])
-        np.add.at(pressing, grain, size[of])
-    reaction = np.hypot(*force.T)
-    inside = grains.boundary & (reaction < INSIDE * pressing)
+    reaction = resultant_norms(contacts, fn, ft, np.zeros((grains.count, 2)))
+    size = np.hypot(fn, ft)
+    inside = grains.boundary & (reaction < INSIDE * sum_on_grains(contacts, size))
     return float(reaction[inside].sum() / size.sum()) if inside.any() else 0.0

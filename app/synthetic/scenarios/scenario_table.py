@@ -79,8 +79,8 @@ DISC_NOISE = 1.18e-4  # [m], 0.7 % of a mean diameter of the two sizes
 
 SHEAR = LoadingPath(shear, 0.25, plates=("top",))
 SOFT = LoadingPath(shear, 0.25, plates=("top",), settings=DemSettings(normal_stiffness=1.6e6))
-RISING = LoadingPath(load_isotropically, 0.0, measured=("top", "right"), settings=DemSettings(normal_stiffness=2e8))
 STIFF = DemSettings(normal_stiffness=2e8)
+RISING = LoadingPath(load_isotropically, 0.0, measured=("top", "right"), settings=STIFF)
 SOFTER = replace(SOFT, settings=DemSettings(normal_stiffness=3e5))
 HEAP = DemSettings(pressure=float("nan"), gravity=(0.0, -9.81), normal_stiffness=2e6)
 DISCS = DemSettings(normal_stiffness=4e5, friction=0.3, wall_friction=0.3, base_friction=10.0)

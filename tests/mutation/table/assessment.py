@@ -107,7 +107,7 @@ MUTANTS = [
     *mutants_of(
         "solver/assessment/penalties.py",
         f"{TESTS}/test_penalties.py",
-        ("return Penalty(INNER_BOUNDARY_LOSS, words) if borne > LEAST_BORNE else None", "return None"),
+        ("return Penalty(INNER_BOUNDARY_LOSS, words) if borne > LEAST_REACTION else None", "return None"),
     ),
     *mutants_of(
         "solver/assessment/mixture_trust.py",

@@ -13,8 +13,8 @@ MUTANTS = [
         ("if boundary is None or len(loaded) != 1 or any", "if boundary is None or any"),
         ("or any(packing.material.gravity):", "or False:"),
         (" or radius[at_plate].sum() < GLUED * radius[beside].sum()", ""),
-        ("grains.boundary & (reaction < INSIDE * pressing)", "grains.boundary"),
-        ("(contacts.i, -1.0, slice(None))", "(contacts.i, 1.0, slice(None))"),
+        ("grains.boundary & (reaction < INSIDE * sum_on_grains(contacts, size))", "grains.boundary"),
+        ("size = np.hypot(fn, ft)", "size = fn"),
         ("reaction[inside].sum() / size.sum()", "reaction.sum() / size.sum()"),
     ),
     *mutants_of(

@@ -20,7 +20,7 @@ MUTANTS = [
     *mutants_of(
         "app/results/results.py",
         "tests/app/results/test_truth_names.py",
-        ("of_boundary = np.append(boundary, True)", "of_boundary = np.append(boundary, False)"),
+        ("keep = move_freely(boundary, self.i, self.j)", "keep = ~boundary[self.i]"),
     ),
     *mutants_of(
         "app/results/hdf5/frame_pieces.py",

@@ -95,7 +95,7 @@ def test_boundary_rods_inside_a_packing_bear_what_others_press_on_them_from_all_
     grains = Grains(np.full(5, 0.1), np.ones(5), np.array([False, True, False, True, False]))
     contacts = SimpleNamespace(
         i=np.array([0, 1, 3]), j=np.array([1, 2, 4]), normal=np.array([[0.0, 1.0]] * 2 + [[0.0, -1.0]]),
-        tangent=np.array([[-1.0, 0.0]] * 2 + [[1.0, 0.0]]),
+        tangent=np.array([[-1.0, 0.0]] * 2 + [[1.0, 0.0]]), with_wall=np.zeros(3, np.bool_), grain_count=5,
     )  # fmt: skip
     fn, ft = np.array([300.0, 200.0, 50.0]), np.zeros(3)
     assert inner_reaction(grains, contacts, fn, ft) == pytest.approx(100.0 / 550.0)
