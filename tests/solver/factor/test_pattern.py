@@ -56,3 +56,15 @@ def test_nodes_without_neighbours_stand_alone():
     pattern = find_pattern(3, none, none)
     assert pattern.row.tolist() == [0, 1, 2]
     assert definite(pattern, none, none, 2)[0].shape == (12,)
+
+
+def test_every_pair_that_the_pattern_lacks_is_refused():
+    pattern = find_pattern(17, *coupled_nodes(4, far=3))
+    filled = set(zip(pattern.column.tolist(), pattern.row.tolist(), strict=True))
+    lacking = [
+        (a, b) for a in range(17) for b in range(a) if tuple(sorted(pattern.place[[a, b]].tolist())) not in filled
+    ]
+    assert len(lacking) > 20
+    for a, b in lacking:
+        with pytest.raises(ValueError, match="not coupled"):
+            pattern.locate(np.array([a]), np.array([b]))
