@@ -8,7 +8,9 @@ and accepted one after the other, those with most contacts first.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,14 +143,22 @@ def infer_unseen(
     if sought:
         near: Array | None = None
         free = np.ones(len(radius), np.bool_) if settings.boundary is None else ~settings.boundary
-        for _ in range(PASSES):
+
+        def surround(rods: list[_Rod]) -> Surroundings:
             every = np.append(free, np.ones(len(rods), np.bool_))
-            around = Surroundings(*_with(radius, position, present, rods), endpoints, noise, side, every)
+            return Surroundings(*_with(radius, position, present, rods), endpoints, noise, side, every)
+
+        left: list[_Rod] = []
+        for _ in range(PASSES):
+            around = surround(rods)
             if known is None:
                 proposed = _propose_of_any_size(around, limits, near, tolerance)
             else:
                 proposed = _propose(around, known, near, tolerance)
+            left += proposed
             new = _select_supported(around, proposed, tolerance)
+            if not new:
+                new = _select_pair(surround, rods, left, tolerance)
             if not new:
                 break
             rods += new
@@ -279,23 +289,58 @@ def _gap_misfit(around: Surroundings, rod: _Rod, tolerance: _Tolerance) -> float
     return float(np.sqrt(np.mean(square))) if square else 0.0
 
 
+def _is_supported(around: Surroundings, rod: _Rod, tolerance: _Tolerance) -> bool:
+    """Return whether a rod overlaps no other, and has contacts enough that chance does not explain."""
+    return bool(
+        rod.held >= max(LEAST_HELD, LEAST_TOUCHES / around.frame_count)
+        and rod.overlapping <= TOLERATED
+        and around.count_free(rod.position, rod.radius, (tolerance.deep, tolerance.apart)) >= LEAST_FREE
+        and (rod.held >= FIRMLY_HELD or _is_held_anew(around, rod, tolerance))
+        and _gap_misfit(around, rod, tolerance) <= GAP_MISFIT * np.sqrt(2.0) * around.noise
+    )
+
+
+def _select_pair(
+    surround: Callable[[list[_Rod]], Surroundings], rods: list[_Rod], proposed: list[_Rod], tolerance: _Tolerance
+) -> list[_Rod]:
+    """Select two rods that touch each other and are supported together, but not by the known bodies alone.
+
+    Of several pairs the one with most contacts is selected.
+    """
+    left: list[_Rod] = []
+    for rod in sorted(proposed, key=lambda each: -each.held):
+        new = not any(_is_at(each, 0, rod.position[0], rod.radius, tolerance.apart) for each in left)
+        if new and rod.overlapping <= TOLERATED and all(_are_apart(rod, each, tolerance) for each in rods):
+            left.append(rod)
+    best: list[_Rod] = []
+    for one, two in combinations(left, 2):
+        gap = np.linalg.norm(one.position - two.position, axis=1) - one.radius - two.radius
+        if np.median(np.abs(gap)) > tolerance.deep:
+            continue
+        beside_two = surround([*rods, two])
+        first = _track(beside_two, one.position[0], 0, one.radius, tolerance)
+        if first.overlapping > TOLERATED:
+            continue
+        beside_first = surround([*rods, first])
+        second = _track(beside_first, two.position[0], 0, two.radius, tolerance)
+        supported = _is_supported(beside_two, first, tolerance) and _is_supported(beside_first, second, tolerance)
+        if supported and first.held + second.held > sum(each.held for each in best):
+            best = [first, second]
+    return best
+
+
+def _are_apart(one: _Rod, other: _Rod, tolerance: _Tolerance) -> bool:
+    """Return whether two rods can be there at once."""
+    distance = np.linalg.norm(one.position - other.position, axis=1)
+    together = distance < one.radius + other.radius - tolerance.deep
+    return bool(together.mean() <= TOLERATED)
+
+
 def _select_supported(around: Surroundings, proposed: list[_Rod], tolerance: _Tolerance) -> list[_Rod]:
     """Select rods with enough contacts, none of which overlaps one with more."""
     chosen: list[_Rod] = []
-    least = max(LEAST_HELD, LEAST_TOUCHES / len(proposed[0].position)) if proposed else 0.0
-    fit = [
-        each for each in proposed
-        if each.held >= least and each.overlapping <= TOLERATED
-        and around.count_free(each.position, each.radius, (tolerance.deep, tolerance.apart)) >= LEAST_FREE
-        and (each.held >= FIRMLY_HELD or _is_held_anew(around, each, tolerance))
-        and _gap_misfit(around, each, tolerance) <= GAP_MISFIT * np.sqrt(2.0) * around.noise
-    ]  # fmt: skip
+    fit = [each for each in proposed if _is_supported(around, each, tolerance)]
     for rod in sorted(fit, key=lambda each: (-each.held, -each.radius)):
-        free = True
-        for other in chosen:
-            apart = np.linalg.norm(rod.position - other.position, axis=1)
-            together = apart < rod.radius + other.radius - tolerance.deep
-            free &= together.mean() <= TOLERATED
-        if free:
+        if all(_are_apart(rod, each, tolerance) for each in chosen):
             chosen.append(rod)
     return chosen

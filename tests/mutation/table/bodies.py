@@ -84,6 +84,9 @@ MUTANTS = [
         ),
         ("<= GAP_MISFIT * np.sqrt(2.0) * around.noise", "<= np.inf"),
         ("anew >= (LEAST_REARRANGED_HELD if rod.held", "anew >= (0 if rod.held"),
+        ("surround([*rods, two])", "surround(rods)"),
+        ("surround([*rods, first])", "surround(rods)"),
+        ("np.median(np.abs(gap)) > tolerance.deep", "np.median(np.abs(gap)) > 0.0"),
     ),
     *mutants_of(
         "solver/bodies/packing.py",

@@ -43,6 +43,18 @@ def test_removed_rods_are_inferred(poses) -> None:
         assert np.all(found.sigma[:, best] < 4 * NOISE)
 
 
+@pytest.mark.parametrize("gone", [(10, 11), (25, 32), (32, 40)])
+def test_two_removed_rods_that_hold_each_other_are_inferred(poses, monkeypatch, gone) -> None:
+    sizes = np.unique(poses["radius"])
+    found = infer(poses, gone, sizes)
+    assert found.count == 2
+    for rod in gone:
+        away = np.linalg.norm(found.position - poses["position"][:, None, rod], axis=2).max(axis=0)
+        assert away.min() < 0.05 * poses["radius"][rod]
+    monkeypatch.setattr(unseen_rods, "_select_pair", lambda *_: [])
+    assert infer(poses, gone, sizes).count == 0
+
+
 def test_removed_rods_of_unknown_size_are_inferred(poses) -> None:
     found = infer(poses, GONE, None)
     true = poses["position"][:, list(GONE)]
