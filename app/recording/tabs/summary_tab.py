@@ -13,7 +13,7 @@ import rerun as rr
 from ...drawing.uncertainty import SURE
 from ...process.counts import state_count
 from ...results.results import setting
-from ...solver.assessment.reasons import split_reasons
+from ...solver.assessment.reasons import split_reasons, without_numbers
 from ...solver.bodies.grains import Array
 from ...solver.frame_forces import FrameForces, FrameStatus
 from ...solver.statistics.agreement import Agreement
@@ -23,7 +23,7 @@ from ..look.printable_text import printable
 from ..look.scene import Scene
 from ..packing_layers.film import STRONG, STRONG_SWEEPS
 
-MAX_REASONS = 5  # frames whose reasons are listed
+MAX_REASONS = 8  # that are listed
 PACKAGES = ("rodsight", "numpy", "numba", "scipy", "rerun-sdk")
 
 
@@ -166,16 +166,20 @@ def _camera(scene: Scene) -> str:
 
 
 def _trust_penalties(frames: list[FrameSummary]) -> str:
-    """Return the reasons that lower the trust of the least trusted frames; empty if there are none."""
+    """Return each reason that lowers the trust once, with the least trusted frame; empty if there are none."""
     lowest = sorted((f.trust, f.frame, f.trust_penalties) for f in frames if f.trust_penalties and np.isfinite(f.trust))
-    listed = lowest[:MAX_REASONS]
-    if not listed:
+    found: dict[str, list[tuple[float, int, str]]] = {}
+    for trust, frame, reasons in lowest:
+        for each in split_reasons(reasons):
+            found.setdefault(without_numbers(each), []).append((trust, frame, each))
+    if not found:
         return ""
     rows: list[str] = []
-    for trust, frame, reasons in listed:
-        rows += [f"- frame {frame}, T {trust:.2f}", *(f"  - {printable(each)}" for each in split_reasons(reasons))]
-    some = f" ({len(listed)} of {len(lowest)} frames)" if len(listed) < len(lowest) else ""
-    return "\n".join([f"Reasons that lower T, least trusted frames first{some}:", "", *rows])
+    for (trust, frame, reason), *others in list(found.values())[:MAX_REASONS]:
+        more = f" and {state_count(len(others), 'more frame')}" if others else ""
+        rows.append(f"- frame {frame}, T {trust:.2f}{more}: {printable(reason)}")
+    some = f" ({MAX_REASONS} of {len(found)})" if len(found) > MAX_REASONS else ""
+    return "\n".join([f"Reasons that lower T{some}, each with the least trusted frame:", "", *rows])
 
 
 def _accuracy(frames: list[FrameSummary]) -> str:

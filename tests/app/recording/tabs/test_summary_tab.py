@@ -21,32 +21,36 @@ def summary_of(frames, path) -> str:
     return rows(path, "/summary")[-1]["TextDocument:text"][0]
 
 
-def test_the_summary_lists_the_reasons_that_lower_the_trust_and_their_cures(tmp_path):
-    frames = make_results(4, sweeps=2).frames
-    cures = ["smaller steps; use more photographs", "", "noise: state the precision · walls", "history: wait"]
+def test_the_summary_lists_each_reason_once_with_its_least_trusted_frame_and_its_cure(tmp_path):
+    reasons = [
+        "smaller steps; use more photographs · noise of 12 µm: state the precision", "",
+        "noise of 3.5 µm: state the precision · walls", "history: wait", "walls",
+    ]  # fmt: skip
     frames = [
-        replace(each, trust=trust, trust_penalties=cure)
-        for each, trust, cure in zip(frames, (0.7, 0.1, 0.4, float("nan")), cures, strict=True)
+        replace(each, trust=trust, trust_penalties=reason)
+        for each, trust, reason in zip(
+            make_results(5, sweeps=2).frames, (0.7, 0.1, 0.4, float("nan"), 0.5), reasons, strict=True
+        )
     ]
     text = summary_of(frames, tmp_path / "run.rrd")
     listed = text[text.index("Reasons that lower T") :].split("\n\n")[1]
     assert listed.splitlines() == [
-        "- frame 2, T 0.40",
-        "  - noise: state the precision",
-        "  - walls",
-        "- frame 0, T 0.70",
-        "  - smaller steps; use more photographs",
+        "- frame 2, T 0.40 and 1 more frame: noise of 3.5 µm: state the precision",
+        "- frame 2, T 0.40 and 1 more frame: walls",
+        "- frame 0, T 0.70: smaller steps; use more photographs",
     ]
 
 
 @pytest.mark.thorough
-def test_the_summary_lists_the_reasons_of_the_least_trusted_frames_only(tmp_path):
+def test_the_summary_lists_so_many_reasons_only(tmp_path):
     count = MAX_REASONS + 3
     frames = [
-        replace(each, trust=0.1 + 0.1 * each.frame, trust_penalties="noise")
+        replace(each, trust=0.05 + 0.05 * each.frame, trust_penalties="noise " + "x" * each.frame)
         for each in make_results(count, sweeps=2).frames
     ]
-    listed = [line for line in summary_of(frames, tmp_path / "run.rrd").splitlines() if line.startswith("- frame ")]
+    text = summary_of(frames, tmp_path / "run.rrd")
+    assert f"Reasons that lower T ({MAX_REASONS} of {count})" in text
+    listed = [line for line in text.splitlines() if line.startswith("- frame ")]
     assert [line.split(",")[0] for line in listed] == [f"- frame {k}" for k in range(MAX_REASONS)]
 
 
