@@ -70,6 +70,7 @@ MUTANTS = [
         ("trust *= 1.0 - evidence.unseen_fraction", "pass"),
         ("return INFERRED_PENALTY * evidence.inferred", "return 0.0 * evidence.inferred"),
         ("if not evidence.assessed:", "if False:"),
+        ("if evidence.loaded else UNLOADED_TRUST_PER_INTERIOR_GRAIN", "if True else 0.0"),
         ("bound = 1.0 - loss - CHAIN_REACH", "bound = 1.0 + loss - CHAIN_REACH"),
     ),
     *mutants_of(
