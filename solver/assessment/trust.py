@@ -23,9 +23,6 @@ CHAIN_CORRECTION: tuple[float, float] = tuple(FITTED["trust"]["single_chain_corr
 CHAIN_REACH: float = FITTED["trust"]["single_chain_reach"]
 INFERRED_PENALTY: float = FITTED["trust"]["inferred_penalty"]
 TRUST_PER_INTERIOR_GRAIN = 0.05  # few grains agree by chance, and most of their forces follow from the boundary
-# Without a known load, as in the middle of a packing: with the former, T exceeded r by more than .03 in 6 % of the frames
-# of crops of 10 to 30 grains (seeds 105 to 107, not those of the choice), with this in 2.5 %.
-UNLOADED_TRUST_PER_INTERIOR_GRAIN = 0.035
 MAX_UNSEEN_FRACTION = 0.2  # of the grains; a tracker rarely loses more than one in ten
 
 
@@ -69,8 +66,8 @@ def motion_assessment(evidence: Evidence) -> Assessment:
 
 
 def interior_limit(evidence: Evidence) -> float:
-    """Greatest trust in a packing with so few interior grains; at least 1 with 20 of them, without a load with 29."""
-    return (TRUST_PER_INTERIOR_GRAIN if evidence.loaded else UNLOADED_TRUST_PER_INTERIOR_GRAIN) * evidence.interior
+    """Greatest trust in a packing with so few interior grains; at least 1 with twenty of them."""
+    return TRUST_PER_INTERIOR_GRAIN * evidence.interior
 
 
 def unseen_penalty(evidence: Evidence) -> float:

@@ -70,7 +70,6 @@ MUTANTS = [
         ("trust *= 1.0 - evidence.unseen_fraction", "pass"),
         ("return INFERRED_PENALTY * evidence.inferred", "return 0.0 * evidence.inferred"),
         ("if not evidence.assessed:", "if False:"),
-        ("if evidence.loaded else UNLOADED_TRUST_PER_INTERIOR_GRAIN", "if True else 0.0"),
         ("bound = 1.0 - loss - CHAIN_REACH", "bound = 1.0 + loss - CHAIN_REACH"),
     ),
     *mutants_of(
@@ -78,10 +77,10 @@ MUTANTS = [
         (EXPECTED, PENALTIES),
         ("known = fraction_seen(evidence) * _known", "known = 1.0 * _known"),
         ("fraction_seen(evidence) * _known_fraction(evidence)", "fraction_seen(evidence)"),
-        (
-            "return max(_as_with_a_load(bound, bound_correlation, evidence), confirmed_correlation(evidence))",
-            "return bound",
-        ),
+        ("return max(_beside_few(bound, evidence), confirmed_correlation(evidence))", "return bound"),
+        ("- FEW_INTERIOR_MARGIN * few", "- 0.0 * few"),
+        ("- 1.0 / MANY_INTERIOR, 0.0)", "- 0.0, 0.0)"),
+        ('own["few_interior"] += alone', 'own["few_interior"] += 0.0 * alone'),
         ("lambda e: 1.0 - e.agreement", "lambda e: e.agreement"),
         ("return float(weaken(value, seen)) if name in BY_SLIDING else value", "return value"),
         ("np.where(np.greater(value, 0.0), strength * value, value)", "np.asarray(strength * value)"),

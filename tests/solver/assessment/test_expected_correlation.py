@@ -196,6 +196,18 @@ def test_without_a_load_what_shows_little_lowers_the_trust(little, monkeypatch):
     assert predict_correlation([little]) == predict_correlation([WELL_KNOWN])
 
 
+def test_without_a_load_few_interior_grains_lower_the_bound_and_not_the_expectation(monkeypatch):
+    eighty, twenty = (replace(WELL_KNOWN, loaded=False, interior=n) for n in (80, 20))
+    lowered, reasons = [bound_correlation(each) for each in (eighty, twenty)], losses(twenty)
+    monkeypatch.setattr(expected_correlation, "FEW_INTERIOR_MARGIN", 0.0)
+    assert bound_correlation(eighty) == lowered[0]
+    assert math.atanh(bound_correlation(twenty)) - math.atanh(lowered[1]) == pytest.approx(8.0 * (1 / 20 - 1 / 80))
+    rise = reasons["few_interior"] - losses(twenty)["few_interior"]
+    assert rise == pytest.approx(bound_correlation(twenty) - lowered[1])
+    monkeypatch.undo()
+    assert bound_correlation(replace(twenty, loaded=True)) == bound_correlation(WELL_KNOWN)
+
+
 def test_a_load_that_is_not_known_is_no_evidence(monkeypatch):
     contradicted = replace(WELL_KNOWN, correction=0.9, power_gap=0.8, unbalance=0.1)
     unloaded = replace(contradicted, loaded=False)
