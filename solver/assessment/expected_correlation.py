@@ -64,8 +64,8 @@ BEST_EIGHTH = 1  # knot of a table: quantiles of the frames of the fit, an eight
 # inertia, and with this limit in 3 %. Chosen on seeds 20, 22, 43, 60 and 61 of 24 kinds without a load.
 UNLOADED_GAIN = 0.1
 # Of arctanh T without a known load, times the interior grains, as far as they are fewer than …: the correlation of few
-# contacts scatters. Crops of 60 to 200 rods, seeds 101 to 107: without it T was above r + .03 in 3.8 % of 704 and 11 % of
-# 495 frames, the latter of smaller crops, and is in 1.1 and 2.6 %.
+# contacts scatters. In crops of 60 to 200 rods T was above r + .03 in 3.8 % of 704 frames (seeds 101 to 104), of 60 to
+# 100 rods in 11 % of 495 (seeds 105 to 107); with it in 1.1 and 2.6 %.
 FEW_INTERIOR_MARGIN, MANY_INTERIOR = 8.0, 80
 LEAST = 1e-4  # of a measure: its logarithm is taken
 LEAST_SIGNAL = 1e-2  # of sliding over its noise, below which no sliding is seen
@@ -105,8 +105,8 @@ def bound_correlation(evidence: Evidence) -> float:
     T = tanh(g − max(a + b g, 0)) with g the argument of `expect_correlation`: a quantile of the errors of g, fitted on
     kinds of input left out (fitted.toml). A margin that depended on measures as well fitted better the kinds that it
     had read, and worse the others. Where the gap error x exceeds the greatest one x_0 that was fitted, nothing is known
-    of r, and T is multiplied by x_0/x. Without a load arctanh T is lower by 8 (1/n − 1/80), n < 80 the number of interior
-    grains. Of soft grains T is at least the `confirmed_correlation`.
+    of r, and T is multiplied by x_0/x. Without a load arctanh T is lower by 8 (1/n − 1/80) with n < 80 interior grains.
+    Of soft grains T is at least the `confirmed_correlation`.
     """
     bound = _as_with_a_load(_bound_by_table(evidence), bound_correlation, evidence)
     return max(_beside_few(bound, evidence), confirmed_correlation(evidence))
