@@ -10,8 +10,9 @@ from pydantic import AfterValidator, Field, StringConstraints
 from ...experiment.experiment import GrainGuess
 from ...process.errors import InputError
 from ...tracking.detection.clicked_circle import fit_clicked
-from ..setup import circles, edits, initialise, photograph_series
+from ..setup import edits, found_walls, photograph_series
 from ..setup.validation import ValidationResult, outside_walls
+from ..setup.walls import bars, circles
 from .endpoints import Line, Number, Numbers, Point, Text, Values, Whole, editing_endpoint, endpoint, without_nul
 from .project import Project
 from .workbench import Workbench
@@ -169,12 +170,11 @@ def draw_wall(
     """Draw a new wall, or redraw the named one."""
     opened = workbench.project(at)
     found = _scaled(opened)
-    drawn = np.array(line)
-    fraction = 1.0
+    drawn, fraction = np.array(line), 1.0
     if snap:
-        drawn, fraction = edits.snap_wall(opened.photograph(0), drawn, found)
+        drawn, fraction = bars.snap_wall(opened.photograph(0), drawn, found)
     else:
-        drawn = edits.towards_packing(drawn, found)
+        drawn = bars.towards_packing(drawn, found)
     walls = circles.bars_of(found)
     if name is None:
         name = _name_for(drawn, found)
@@ -189,8 +189,8 @@ def draw_wall(
 def find_walls(workbench: Workbench, at: Text) -> dict[str, Any]:
     """Find the bars around the rods, and the discs in the corners where they meet."""
     opened = workbench.project(at)
-    bars, discs = initialise.find_frame(opened.draft, opened.photograph(0), _scaled(opened))
-    return opened.describe() | {"bars": bars, "discs": discs}
+    count, discs = found_walls.find_frame(opened.draft, opened.photograph(0), _scaled(opened))
+    return opened.describe() | {"bars": count, "discs": discs}
 
 
 @editing_endpoint
@@ -236,7 +236,7 @@ def find_corner(workbench: Workbench, at: Text, x: Number, y: Number) -> dict[st
     opened = workbench.project(at)
     found = _scaled(opened)
     disc = circles.corner_at(opened.photograph(0), found, x, y)
-    initialise.add_discs(opened.draft, found, [disc])
+    found_walls.add_discs(opened.draft, found, [disc])
     return opened.describe() | {"wall": disc.name}
 
 
@@ -254,9 +254,8 @@ def delete_wall(workbench: Workbench, at: Text, name: Text) -> dict[str, Any]:
         left = [each for each in circles.circles_of(found) if each.name != name]
         circles.set_circles(opened.draft, found, left, f"wall {name} deleted")
         return opened.describe()
-    edits.set_walls(
-        opened.draft, found, [each for each in circles.bars_of(found) if each[0] != name], f"wall {name} deleted"
-    )
+    others = [each for each in circles.bars_of(found) if each[0] != name]
+    edits.set_walls(opened.draft, found, others, f"wall {name} deleted")
     return opened.describe()
 
 
@@ -283,7 +282,8 @@ def set_plate(
 def detect_rods(workbench: Workbench, at: Text, radii: Numbers) -> dict[str, Any]:
     """Detect the rods of the first photograph; radii [m]: the classes, empty where they are not known."""
     opened = workbench.project(at)
-    detection = edits.detect(opened.used_photograph(0), opened.validation(), radii)
+    image = opened.used_photograph(0)
+    detection = edits.within_picture(edits.detect(image, opened.validation(), radii), image)
     edits.set_rods(opened.draft, f"{detection.count} rods found", edits.as_guess(detection), radii)
     return opened.describe() | {"quality": np.round(detection.quality, 3).tolist()}
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from ...drawing.wall_marks import wall_mark
 from ...experiment.experiment import GrainGuess
-from .circles import corner_names, discs_of
 from .edits import TABLES
 from .validation import ValidationResult
+from .walls.circles import corner_names, discs_of
 
 
 def table_names(data: dict[str, Any]) -> list[str]:

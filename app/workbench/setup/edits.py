@@ -24,11 +24,9 @@ from ...tracking.detection.clicked_circle import fit_clicked
 from ...tracking.detection.detect import Detection, DetectionSettings
 from ...tracking.detection.scale_comparison import find_other_scale, packed_fraction
 from ...tracking.missed_rods import detect_rods
-from ...tracking.walls.inner_edge import find_edge
-from ...tracking.walls.surrounding_bars import depth_in_circles, find_bars, lines_to_corners
-from .circles import arcs_table, circles_of, moved_corners, renamed
 from .draft import Draft, as_table
 from .validation import ValidationResult, validate
+from .walls.circles import arcs_table, circles_of, moved_corners, renamed
 
 # Tables of other programs by their key: section, file, columns, and the keys that they replace.
 TABLES: dict[str, tuple[str, str, Sequence[str], Sequence[str]]] = {
@@ -39,12 +37,9 @@ TABLES: dict[str, tuple[str, str, Sequence[str], Sequence[str]]] = {
 GRAINS, WALLS, CORRECTIONS = "grains.csv", "walls.csv", "corrections.csv"
 GRAIN_COLUMNS = ("id", "x", "y", "radius")
 OVERLAP = 0.15  # [radii] that a rod added by hand may overlap others: clicks and fits have errors
-TOUCHES = 0.08  # radii between the edge of a bar and the rod next to it; else it is another edge
 # Radii form classes where so many, from so many rods on, are within so much of one of so few classes.
 NEARLY_ALL, FEWEST_EVIDENT, EVIDENT, MOST_EVIDENT = 0.85, 20, 0.015, 5
 RARE = 0.08  # fraction of the rods that no class has
-SNAP = 0.6  # radii from the line that bounds the rods to the edge of a bar, at most
-NAMES = ("bottom", "right", "top", "left")
 # Densities [kg/m³] and textbook friction coefficients of dry, clean rods: initial values.
 MATERIALS: dict[str, dict[str, float]] = {
     "aluminium": {"density": 2700.0, "friction": 0.25},
@@ -147,57 +142,6 @@ def walls_file(found: ValidationResult) -> str:
     return walls.get("file", WALLS) if isinstance(walls, dict) else WALLS
 
 
-def snap_wall(image: Image, line: Array, found: ValidationResult) -> tuple[Array, float]:
-    """Move a drawn line (2, 2) [px] onto the edge beside it, if enough is visible.
-
-    Returns
-    -------
-    tuple
-        The line, with the packing on its left, and the visible fraction of the edge.
-    """
-    line = towards_packing(line, found)
-    length = float(np.linalg.norm(line[1] - line[0]))
-    edge = find_edge(image, line, min(max(0.03 * length, 8.0), 40.0))
-    return edge.line if edge.is_seen else line, edge.fraction
-
-
-def towards_packing(line: Array, found: ValidationResult) -> Array:
-    """Return the line in the direction that has the packing to its left in the world."""
-    assert found.shape is not None
-    if found.rods is not None:
-        middle = np.array([found.rods.x.mean(), found.rods.y.mean()])
-    else:
-        middle = 0.5 * np.array([found.shape[1], found.shape[0]], dtype=np.float64)
-    along, to = line[1] - line[0], middle - line[0]
-    return line if along[0] * to[1] - along[1] * to[0] < 0.0 else line[::-1].copy()  # y down
-
-
-def find_walls(image: Image, found: ValidationResult) -> Array:
-    """Find the bars (w, 2, 2) [px] around the rods; raise InputError if the rods are too few."""
-    rods = found.rods
-    if rods is None or len(rods.id) < 8:
-        raise InputError(
-            GRAINS, "", "holds too few rods to find bars around them: detect the rods first, or draw the bars"
-        )
-    lines = find_bars(rods.x, rods.y, rods.radius)
-    edges = [find_edge(image, line, SNAP * float(np.median(rods.radius))) for line in lines]
-    chosen = [
-        edge.line if edge.is_seen and abs(depth_in_circles(edge.line, rods.x, rods.y, rods.radius)) < TOUCHES else line
-        for line, edge in zip(lines, edges, strict=True)
-    ]
-    return lines_to_corners(np.array(chosen))
-
-
-def shows_edge(image: Image, line: Array, rods: GrainGuess) -> bool:
-    """Whether the edge of a bar is seen along a line (2, 2) [px]."""
-    return find_edge(image, line, SNAP * float(np.median(rods.radius))).is_seen
-
-
-def names_of(lines: Array) -> tuple[str, ...]:
-    """Return the names of the bars of a frame, in the order of find_walls."""
-    return NAMES if len(lines) == len(NAMES) else tuple(f"wall{k + 1}" for k in range(len(lines)))
-
-
 def set_walls(draft: Draft, found: ValidationResult, walls: Sequence[tuple[str, Array]], change: str) -> None:
     """Write the walls of frame 0 by names and ends (2, 2) [px]; settings of removed walls are deleted."""
     if found.scale is None:
@@ -258,6 +202,11 @@ def detect(
         The known classes [m]; empty: unknown.
     radius_range : tuple of float, optional
         Least and greatest radius [px] to look for, where the classes are unknown.
+
+    Returns
+    -------
+    Detection
+        With circles whose centres lie outside of the picture.
     """
     pixel = None if found.scale is None else found.scale.mean_size
     if radii and pixel is None:
@@ -372,6 +321,13 @@ def evident_classes(radius: Array) -> Array | None:
     return classes if np.mean(off < EVIDENT) >= NEARLY_ALL and np.median(off) < 0.25 * EVIDENT else None
 
 
+def within_picture(detection: Detection, image: Image) -> Detection:
+    """Drop circles whose centres lie outside of the picture (H, W): less than half of such a rod is seen."""
+    height, width = image.shape
+    x, y = detection.x, detection.y
+    return detection.select((x >= -0.5) & (y >= -0.5) & (x <= width - 0.5) & (y <= height - 0.5))
+
+
 def within_walls(detection: Detection, found: ValidationResult) -> Detection:
     """Drop circles beyond the walls: screws and wheels of the apparatus are round, too."""
     if found.walls is None or found.scale is None:
@@ -380,10 +336,7 @@ def within_walls(detection: Detection, found: ValidationResult) -> Detection:
     along = end - start
     place = np.stack([detection.x, detection.y], axis=1)[:, None] - start
     inside: NDArray[np.bool_] = (along[:, 0] * place[..., 1] - along[:, 1] * place[..., 0] < 0.0).all(axis=1)
-    if inside.mean() < 0.2:
-        return detection
-    columns = (detection.x, detection.y, detection.radius, detection.sigma, detection.quality)
-    return Detection(*(each[inside] for each in columns))
+    return detection if inside.mean() < 0.2 else detection.select(inside)
 
 
 def walls_table(names: Sequence[str], ends: Array, scale: Scale) -> bytes:

@@ -21,11 +21,11 @@ from ...experiment.reading.photograph_order import in_order, natural_key
 from ...process.atomic import replacing_folder, write_atomically
 from ...process.errors import InputError
 from ...solver.bodies.wall_shapes import STRAIGHT
-from .circles import ARCS, arcs_table, circles_of
 from .draft import Draft
 from .edits import WALLS, walls_table
 from .toml_edit import set_values
 from .validation import ValidationResult
+from .walls.circles import ARCS, arcs_table, circles_of
 
 PICTURES = frozenset((".png", ".tif", ".tiff", ".jpg", ".jpeg")) | RAW_SUFFIXES
 DEEPEST = 3  # folders below the one that was opened

@@ -15,33 +15,28 @@ from ...exchange.foreign.file_formats import DEFAULT_PIXEL_SIZE
 from ...exchange.photographic.opencv_calibration import read_calibration
 from ...exchange.photographic.rod_readings import read_rods
 from ...exchange.photographic.video_frames import duration, extract_frames, is_video
-from ...experiment.experiment import GrainGuess
 from ...experiment.photographs import Photographs
 from ...experiment.pictures.image import FULL_SCALE, Channel, Image, ImageSelection
 from ...experiment.pictures.picture_file import read_photograph
-from ...experiment.plausibility import rods_cut_by_walls
 from ...process.atomic import write_atomically
-from ...process.counts import state_count
 from ...process.errors import InputError
 from ...process.frame_range import ALL_FRAMES, FrameRange
-from ...solver.bodies.wall_shapes import STRAIGHT
 from ...tracking.detection.channels import View, compare_views
 from ...tracking.detection.detect import Detection, DetectionSettings, refine_grains
 from ...tracking.detection.rim_quality import describe_faint_rims, describe_scale
 from ...tracking.outline.missing_discs import add_missing_discs
 from ...tracking.texture_or_outline import prefer_outlines
-from ...tracking.walls.plain_bars import can_be_followed
-from . import circles, edits
+from . import edits
 from .draft import Draft
 from .experiment_folders import valid_name
+from .found_walls import replace_unseen_bars, set_found_walls
 from .setup_picture import draw_setup
-from .validation import ValidationResult, first_tracks, validate
+from .validation import ValidationResult, validate
 
 PICTURE = "understood.png"
 MOST_VIEWS, KEPT = 3, 0.8  # of a photograph that are tried; fraction of the discs of the small copy
 KEPT_IN_CLASSES = 0.98  # of the rods must be found again with the sizes that nearly all have
 ASSUMED_INTERVAL = 1.0  # s
-FEWEST_BARS = 2  # of a packing with open sides; with fewer the outermost rods are its boundary
 FOUND, NONE = "auto", "none"
 
 
@@ -128,7 +123,11 @@ def _initialise(folder: Path, draft: Draft, flags: SetupFlags, video: list[str])
         keys = {"photographs.channel": view.channel if view.channel != "grey" else None, "photographs.follow": follow}
         draft.set_keys("channel and following", {key: value for key, value in keys.items() if value is not None})
         found = _without_errors(draft, "photographs")
-        plain, followed = _replace_plain_bars(draft, flags, photographs, selection, found)
+        plain, followed = [], []
+        if flags.walls == FOUND:
+            files = photographs.files[:2]
+            images = [selection.cut(read_photograph(file, channel=selection.channel)) for file in files]
+            plain, followed = replace_unseen_bars(draft, images, found, flags.pressure)
         found = _without_errors(draft, "photographs")
         write_atomically(folder / PICTURE, draw_setup(_first(photographs, selection), found))
         faint = [] if flags.grains is not None else [describe_faint_rims(detection)]
@@ -266,77 +265,8 @@ def _choose_follow(
     return ("outline", [reason]) if reason else (None, [])
 
 
-def _replace_plain_bars(
-    draft: Draft, flags: SetupFlags, photographs: Photographs, selection: ImageSelection, found: ValidationResult
-) -> tuple[list[str], list[str]]:
-    """Impose the motion of the outermost rods where found bars cannot be followed; return warnings, and remarks."""
-    walls, scale, rods = found.walls, found.scale, found.rods
-    if flags.walls != FOUND or len(photographs) < 2 or walls is None or scale is None or rods is None:
-        return [], []
-    if (walls.sides != STRAIGHT).any():  # bars follow the discs in their corners
-        return [], []
-    first, second = (selection.cut(read_photograph(file, channel=selection.channel)) for file in photographs.files[:2])
-    radius = float(rods.radius.mean()) * scale.mean_size
-    texture, edge = can_be_followed((first, second), walls.endpoints[0], scale, radius)
-    if (seen := texture | edge).all():
-        names = ", ".join(repr(walls.name[w]) for w in np.flatnonzero(~texture))
-        return [], [f"Bars without paint are followed by their edges: {names}."] if names else []
-    named = list(zip(walls.name, scale.to_pixels(walls.endpoints[0]), strict=True))
-    barred = seen | [name in flags.pressure or edits.shows_edge(first, line, rods) for name, line in named]
-    if not barred.all() and barred.sum() >= FEWEST_BARS and seen[barred].all():
-        edits.set_walls(draft, found, [named[w] for w in np.flatnonzero(barred)], "sides without a bar left out")
-        names = ", ".join(repr(named[w][0]) for w in np.flatnonzero(~barred))
-        return [f"No bar is seen at {names}: the packing is open there. Draw it by rodsight open if there is one."], []
-    names = ", ".join(repr(walls.name[w]) for w in np.flatnonzero(~seen))
-    fact = f"Bars {names} show nothing by which they could be followed to the second photograph"
-    if flags.pressure:
-        return [f"{fact}: give the ends of all bars in every photograph in walls.csv, or [walls] track = false."], []
-    instead = _impose_outer_rods(draft, found)
-    return [f"{fact}: {instead} If they are at rest, draw them by rodsight open and set [walls] track = false."], []
-
-
-def _impose_outer_rods(draft: Draft, found: ValidationResult) -> str:
-    """Remove the walls, and let the outermost rods be the boundary; return the end of a sentence on it."""
-    edits.set_walls(draft, found, [], "no walls")
-    draft.set_keys("boundary", {"boundary.grains": "outer"})
-    return 'the motion of the outermost rods is imposed instead ([boundary] grains = "outer").'
-
-
 def _first(photographs: Photographs, selection: ImageSelection) -> Image:
     return read_photograph(photographs.files[0], channel=selection.channel)
-
-
-def find_frame(draft: Draft, image: Image, found: ValidationResult) -> tuple[int, int]:
-    """Write the bars around the rods, and the discs where they meet; return how many of each. One step of undo."""
-    lines = edits.find_walls(image, found)
-    with draft.one_step("walls found"):
-        edits.set_walls(draft, found, list(zip(edits.names_of(lines), lines, strict=True)), "walls found")
-        barred = validate(draft)
-        discs = find_discs(draft, image, barred)
-    return len(lines), discs
-
-
-def find_discs(draft: Draft, image: Image, found: ValidationResult) -> int:
-    """Write the discs where bars meet to the table of corners; return their number."""
-    discs = circles.find_corners(image, found)
-    if discs:
-        add_discs(draft, found, discs)
-    return len(discs)
-
-
-def add_discs(draft: Draft, found: ValidationResult, discs: Sequence[circles.Circle]) -> None:
-    """Write discs in corners of the frame; circles that were detected on them are no rods. One step of undo."""
-    with draft.one_step("corners"):
-        circles.add_corners(draft, found, discs)
-        rods = found.rods
-        if rods is None:
-            return
-        on = np.zeros(len(rods.id), np.bool_)
-        for disc in discs:
-            on |= np.hypot(rods.x - disc.x, rods.y - disc.y) < disc.radius
-        if on.any():
-            left = GrainGuess(rods.id[~on], rods.x[~on], rods.y[~on], rods.radius[~on])
-            edits.set_rods(draft, "circles on corner discs dropped", left)
 
 
 def _find_rods_and_walls(
@@ -344,37 +274,14 @@ def _find_rods_and_walls(
 ) -> tuple[ValidationResult, Detection, list[str]]:
     """Set rods, walls and pressures; also return the rods, and sentences on what was left out."""
     notes: list[str] = []
-    edits.set_rods(draft, "rods", edits.as_guess(detection), flags.radii)
+    edits.set_rods(draft, "rods", edits.as_guess(edits.within_picture(detection, first)), flags.radii)
     if flags.walls == NONE:
         if flags.pressure:
             raise InputError("--pressure", next(iter(flags.pressure)), "loads a wall, but there are none: --walls none")
-        return validate(draft), detection, notes
-    if flags.walls == FOUND:
-        found = validate(draft)
-        lines = edits.find_walls(first, found)
-        names = edits.names_of(lines)
-        edits.set_walls(draft, found, list(zip(names, lines, strict=True)), "walls")
-        found = validate(draft)
-        cut = {} if found.walls is None else rods_cut_by_walls(first_tracks(found), found.walls.frames(0, 1))
-        if cut:
-            whole = [(name, line) for name, line in zip(names, lines, strict=True) if name not in cut]
-            edits.set_walls(draft, found, whole, "walls that cut through no rod")
-            found = validate(draft)
-            notes += [
-                f"Wall {name!r} is left out, since it would cut through {state_count(count, 'rod')}."
-                for name, count in cut.items()
-            ]
-        count = detection.count
-        detection = edits.within_walls(detection, found) if flags.grains is None else detection
-        if detection.count < count:
-            edits.set_rods(draft, "circles beyond the bars left out", edits.as_guess(detection), flags.radii)
-            found = validate(draft)
-            notes.append(f"{state_count(count - detection.count, 'circle')} beyond the bars left out: no rods.")
-        find_discs(draft, first, found)
-        wrong = validate(draft).steps["walls"].errors
-        if wrong and not flags.pressure:  # rods that stand in no frame of four bars, or circles that are no rods
-            instead = _impose_outer_rods(draft, found)
-            notes.append(f"The bars that were found do not hold the rods ({wrong[0]}): {instead}")
+    elif flags.walls == FOUND:
+        detection, notes = set_found_walls(
+            draft, first, detection, flags.radii, loaded=bool(flags.pressure), known=flags.grains is not None
+        )
     else:
         source = Path(flags.walls)
         if not source.is_file():
@@ -388,7 +295,7 @@ def _find_rods_and_walls(
             there = ", ".join(found.walls.name)
             raise InputError("--pressure", f"{wall}={pressure:g}", f"there is no such wall; there are {there}")
         edits.set_plate(draft, found, wall, {"pressure": pressure})
-    return _without_errors(draft, *validate(draft).steps), detection, notes
+    return _without_errors(draft, *validate(draft).steps), edits.within_picture(detection, first), notes
 
 
 def _without_errors(draft: Draft, *steps: str) -> ValidationResult:

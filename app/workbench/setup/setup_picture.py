@@ -10,8 +10,8 @@ from ...drawing.wall_marks import wall_mark
 from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
 from ...solver.bodies.wall_shapes import STRAIGHT
-from .circles import circles_of
 from .validation import ValidationResult
+from .walls.circles import circles_of
 
 # Of classes of radii, distinct for the colour-blind (Okabe and Ito); blue, green, red.
 COLOURS = ((233, 180, 86), (0, 159, 230), (115, 158, 0), (167, 121, 204), (66, 228, 240), (0, 94, 213))

@@ -7,9 +7,10 @@ import pytest
 from rodsight.experiment.reading.tables import read_table
 from rodsight.synthetic.synthesis import SynthesisSettings, synthesize
 from rodsight.workbench.service.workbench import Workbench
-from rodsight.workbench.setup import circles, initialise
+from rodsight.workbench.setup import found_walls
 from rodsight.workbench.setup.draft import Draft
 from rodsight.workbench.setup.validation import validate
+from rodsight.workbench.setup.walls import circles
 
 from tests.app.workbench.conftest import Visitor
 
@@ -159,8 +160,8 @@ def test_discs_are_looked_for_between_the_bars_just_found_and_take_the_circles_o
         looked.append(len(circles.bars_of(found)))
         return discs
 
-    monkeypatch.setattr(initialise.edits, "find_walls", lambda image, found: FRAME)
-    monkeypatch.setattr(initialise.circles, "find_corners", find_corners)
+    monkeypatch.setattr(found_walls.bars, "find_walls", lambda image, found: FRAME)
+    monkeypatch.setattr(found_walls.circles, "find_corners", find_corners)
     described = visitor.request("find_walls", at=at)
     assert looked == [4]
     assert (described["bars"], described["discs"]) == (4, 2)

@@ -7,8 +7,8 @@ import pytest
 from rodsight.experiment.experiment import GrainGuess
 from rodsight.tracking.detection.clicked_circle import fit_clicked
 from rodsight.tracking.walls.inner_edge import Edge
-from rodsight.workbench.setup import edits
 from rodsight.workbench.setup.edits import fit_rod
+from rodsight.workbench.setup.walls import bars
 
 SIZE, MIDDLE, LARGE, SMALL = 240, 119.5, 44.0, 32.0
 CLASSES = [0.008, 0.011]
@@ -46,7 +46,7 @@ def test_a_rod_that_is_added_leaves_its_neighbours_room(disc, gap, expected):
 def test_edges_that_no_rod_touches_or_that_cut_rods_are_no_walls(monkeypatch):
     column, row = (each.ravel() for each in np.meshgrid(np.arange(5), np.arange(4)))
     rods = GrainGuess(np.arange(20), 30.0 + 20.0 * column, 30.0 + 20.0 * row, np.full(20, 10.0))
-    found = SimpleNamespace(rods=rods)
+    found = SimpleNamespace(rods=rods, steps={"rods": SimpleNamespace(errors=[])})
     shift = iter([0.5, 6.0, -6.0, 0.5])  # [px] of the edges beyond the rods
 
     def snap(image, line, reach):
@@ -54,8 +54,8 @@ def test_edges_that_no_rod_touches_or_that_cut_rods_are_no_walls(monkeypatch):
         outward = np.array([-along[1], along[0]]) / np.hypot(*along)
         return Edge(line + next(shift) * outward, 1.0, np.full(2, 0.1), 100.0)
 
-    monkeypatch.setattr(edits, "find_edge", snap)
-    lines = edits.find_walls(np.zeros((130, 150), np.float32), found)
+    monkeypatch.setattr(bars, "find_edge", snap)
+    lines = bars.find_walls(np.zeros((130, 150), np.float32), found)
     sides = np.array([float(np.mean(lines[w, :, 1 - w % 2])) for w in range(4)])
     assert np.abs(sides - [100.0, 120.0, 20.0, 20.0]) == pytest.approx([0.5, 0.0, 0.0, 0.5], abs=0.05)
 

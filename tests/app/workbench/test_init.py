@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment, read_grain_guess
-from rodsight.workbench.setup import edits, initialise
+from rodsight.workbench.setup import edits, found_walls
 
 from tests.program import rodsight
 
@@ -122,8 +122,8 @@ def test_walls_that_cut_through_rods_are_left_out_and_named(tmp_path, capsys, mo
         [[20.0, 262.0], [340.0, 262.0]], [[334.0, 262.0], [334.0, 18.0]], [[334.0, 18.0], [20.0, 18.0]],
         [[20.0, 18.0], [150.0, 262.0]],
     ])  # fmt: skip
-    monkeypatch.setattr("rodsight.workbench.setup.edits.find_walls", lambda *_: lines)
-    monkeypatch.setattr(initialise, "can_be_followed", lambda _, ends, *__: 2 * (ends[:, 0, 0] > -1,))
+    monkeypatch.setattr("rodsight.workbench.setup.walls.bars.find_walls", lambda *_: lines)
+    monkeypatch.setattr(found_walls, "can_be_followed", lambda _, ends, *__: 2 * (ends[:, 0, 0] > -1,))
     flags = ("--photographs", "shots/*.png", "--interval", 5, "--pixel-size", 1e-4, "--channel", "red")
     assert rodsight("init", tmp_path, *flags, "--radius-range", "18:30") == 0
     printed = capsys.readouterr().out.replace("\n", " ")
@@ -149,6 +149,36 @@ def test_bars_without_texture_are_no_walls_but_impose_the_motion_of_the_outermos
     assert not (folder / "walls.csv").exists()
 
 
+def test_a_part_of_a_packing_has_no_walls_where_the_picture_ends(tmp_path, capsys):
+    discs(tmp_path, columns=8, rows=8)
+    for file in (tmp_path / "shots").glob("*.png"):
+        picture = cv2.imread(str(file))
+        cv2.imwrite(str(file), picture[60:-90, 55:-100])  # some of the discs with their centres outside
+    flags = ("--photographs", "shots/*.png", "--channel", "red", "--radius-range", "18:30", "--follow", "outline")
+    assert rodsight("init", tmp_path, *flags) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "goes on beyond the picture at 'bottom', 'right', 'top', 'left': no wall is there" in printed
+    made = load_experiment(tmp_path)
+    assert made.config.walls is None
+    assert made.config.boundary.grains == "outer"
+    assert 20 < len(read_grain_guess(made).id) < 64
+
+
+def test_one_photograph_without_bars_has_no_walls(tmp_path, capsys):
+    discs(tmp_path)
+    flags = ("--photographs", "shots/0.png", "--channel", "red", "--radius-range", "18:30")
+    assert rodsight("init", tmp_path, *flags) == 0
+    assert "No bar is seen at 'bottom', 'right', 'top', 'left': the motion of the outermost" in capsys.readouterr().out
+    assert load_experiment(tmp_path).config.boundary.grains == "outer"
+
+
+def test_bars_need_some_rods(tmp_path, capsys):
+    discs(tmp_path, columns=3, rows=2)
+    flags = ("--photographs", "shots/*.png", "--channel", "red", "--radius-range", "18:30", "--quiet")
+    assert rodsight("init", tmp_path, *flags) == 2
+    assert "bars: cannot be found around 6 rods: at least 8 are needed" in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_bars_that_do_not_hold_the_rods_do_not_end_the_set_up(tmp_path, capsys, monkeypatch):
     discs(tmp_path)
@@ -156,7 +186,7 @@ def test_bars_that_do_not_hold_the_rods_do_not_end_the_set_up(tmp_path, capsys, 
         [[340.0, 262.0], [20.0, 262.0]], [[334.0, 18.0], [334.0, 262.0]], [[20.0, 18.0], [334.0, 18.0]],
         [[20.0, 262.0], [20.0, 18.0]],
     ])  # fmt: skip
-    monkeypatch.setattr("rodsight.workbench.setup.edits.find_walls", lambda *_: lines)
+    monkeypatch.setattr("rodsight.workbench.setup.walls.bars.find_walls", lambda *_: lines)
     flags = ("--photographs", "shots/*.png", "--channel", "red", "--radius-range", "18:30")
     assert rodsight("init", tmp_path, *flags) == 0
     assert "The bars that were found do not hold the rods" in capsys.readouterr().out
@@ -303,8 +333,8 @@ def test_a_side_without_a_bar_leaves_the_others(folder, monkeypatch, capsys, fol
     def can_be_followed(images, ends, *_):
         return 2 * (followed | (ends[:, :, 1].mean(axis=1) < 0.9 * ends[:, :, 1].max()),)
 
-    monkeypatch.setattr(edits, "shows_edge", shows_edge)
-    monkeypatch.setattr(initialise, "can_be_followed", can_be_followed)
+    monkeypatch.setattr(found_walls.bars, "shows_edge", shows_edge)
+    monkeypatch.setattr(found_walls, "can_be_followed", can_be_followed)
     flags = (
         "--photographs",
         "pictures/*.jpg",

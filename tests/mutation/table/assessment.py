@@ -87,7 +87,7 @@ MUTANTS = [
         ("evidence.correction - CORRECTED_NOISE * (1.0 - seen)", "evidence.correction"),
         ("return min(beyond, seen * evidence.correction)", "return beyond"),
         ("return min(found, math.tanh(math.atanh(loaded) + UNLOADED_GAIN))", "return found"),
-        ("    if not _is_limited(evidence):\n", "    if True:\n"),
+        ("    if _is_limited(evidence):\n", "    if False:\n"),
         ("return evidence.position_weight * (1.0 - fraction_seen(evidence)) * beyond", "return beyond"),
         ("beyond = evidence.corrected_gap - found.noise", "beyond = evidence.corrected_gap"),
         ("1.0 - float(np.fmax(e.agreement, e.overlap_agreement))", "1.0 - e.agreement"),

@@ -4,12 +4,31 @@ from tests.mutation.mutant import mutants_of
 
 MUTANTS = [
     *mutants_of(
-        "app/workbench/setup/circles.py",
+        "app/workbench/setup/walls/circles.py",
         "tests/app/workbench/test_setup.py",
         ("if abs(twice) < FLAT * longest:", "if False:"),
         ('return "in" if side == IN else "out"', 'return "in"'),
         ("removed = {each.name for each in circles_of(found)} - {each.name for each in circles}", "removed = set()"),
         ("rods.x[:, None] + rods.radius[:, None] * np.cos(angle)", "rods.x[:, None] + 0.0 * np.cos(angle)"),
+    ),
+    *mutants_of(
+        "app/workbench/setup/walls/bars.py",
+        "tests/app/workbench/test_init.py",
+        ("if np.mean(((places >= 0.0) & (places < size)).all(axis=1)) < 0.5:", "if False:"),
+        ("return bool(np.any((beyond > 0.0) & (beyond", "return bool(np.all((beyond > 0.0) & (beyond"),
+        ("len(rods.id) < FEWEST_INSIDE", "len(rods.id) < 1"),
+    ),
+    *mutants_of(
+        "app/workbench/setup/found_walls.py",
+        "tests/app/workbench/test_init.py",
+        ("if len(named) < FEWEST_BARS and not loaded:", "if False:"),
+        ("followed = seen if len(images) > 1 else barred", "followed = barred"),
+        ("if barred.all() and followed.all():", "if followed.all():"),
+    ),
+    *mutants_of(
+        "app/workbench/setup/edits.py",
+        "tests/app/workbench/test_init.py",
+        ("return detection.select((x >= -0.5)", "return detection.select((x >= -99.0)"),
     ),
     *mutants_of(
         "app/tracking/walls/round_edge.py",
@@ -87,7 +106,7 @@ MUTANTS = [
         ),
     ),
     *mutants_of(
-        "app/workbench/setup/circles.py",
+        "app/workbench/setup/walls/circles.py",
         "tests/app/workbench/test_corner_discs.py",
         ("return [each for each in discs if each.name not in taken]", "return discs"),
     ),

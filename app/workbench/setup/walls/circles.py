@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from ...experiment.pictures.image import Image
-from ...experiment.reading.corners import CORNER_COLUMNS
-from ...experiment.units import Scale
-from ...experiment.walls import ARC_COLUMNS
-from ...process.errors import InputError
-from ...solver.bodies.grains import Array
-from ...solver.bodies.wall_shapes import IN, STRAIGHT, circle_parameters
-from ...tracking.walls.corner_rims import BETWEEN_BARS, CLICKED, find_disc
-from ...tracking.walls.round_edge import snap_to_rim
-from .draft import Draft, as_table
-from .validation import ValidationResult
+from ....experiment.pictures.image import Image
+from ....experiment.reading.corners import CORNER_COLUMNS
+from ....experiment.units import Scale
+from ....experiment.walls import ARC_COLUMNS
+from ....process.errors import InputError
+from ....solver.bodies.grains import Array
+from ....solver.bodies.wall_shapes import IN, STRAIGHT, circle_parameters
+from ....tracking.walls.corner_rims import BETWEEN_BARS, CLICKED, find_disc
+from ....tracking.walls.round_edge import snap_to_rim
+from ..draft import Draft, as_table
+from ..validation import ValidationResult
 
 ARCS, CORNERS = "arcs.csv", "corners.csv"
 RIM = 24  # points of a rod's rim that a circle around the rods must hold
