@@ -152,7 +152,7 @@ def replace_unseen_bars(
             return [], [f"Bars without paint are followed by their edges: {names}."] if names else []
     barred = seen | [name in pressure or bars.shows_edge(images[0], line, rods) for name, line in named]
     followed = seen if len(images) > 1 else barred  # of one photograph nothing is followed
-    if barred.all() and followed.all():
+    if followed.all():
         return [], []
     if barred.sum() >= FEWEST_BARS and followed[barred].all():
         edits.set_walls(draft, found, [named[w] for w in np.flatnonzero(barred)], "sides without a bar left out")

@@ -153,7 +153,7 @@ def test_a_part_of_a_packing_has_no_walls_where_the_picture_ends(tmp_path, capsy
     discs(tmp_path, columns=8, rows=8)
     for file in (tmp_path / "shots").glob("*.png"):
         picture = cv2.imread(str(file))
-        cv2.imwrite(str(file), picture[60:-90, 55:-100])  # some of the discs with their centres outside
+        cv2.imwrite(str(file), picture[60:-90, 48:-100])  # some of the discs with their centres outside
     flags = ("--photographs", "shots/*.png", "--channel", "red", "--radius-range", "18:30", "--follow", "outline")
     assert rodsight("init", tmp_path, *flags) == 0
     printed = " ".join(capsys.readouterr().out.split())
@@ -170,6 +170,20 @@ def test_one_photograph_without_bars_has_no_walls(tmp_path, capsys):
     assert rodsight("init", tmp_path, *flags) == 0
     assert "No bar is seen at 'bottom', 'right', 'top', 'left': the motion of the outermost" in capsys.readouterr().out
     assert load_experiment(tmp_path).config.boundary.grains == "outer"
+
+
+def test_bars_that_are_seen_but_cannot_be_followed_impose_the_motion_of_the_outermost_rods(
+    tmp_path, monkeypatch, capsys
+):
+    discs(tmp_path)
+    monkeypatch.setattr(found_walls.bars, "shows_edge", lambda *_: True)
+    monkeypatch.setattr(found_walls, "can_be_followed", lambda *_: np.zeros((2, 4), bool))
+    flags = ("--channel", "red", "--radius-range", "18:30", "--follow", "outline")
+    assert rodsight("init", tmp_path, "--photographs", "shots/*.png", *flags) == 0
+    assert "show nothing by which they could be followed" in " ".join(capsys.readouterr().out.split())
+    assert rodsight("init", tmp_path / "one", "--photographs", "../shots/0.png", *flags) == 0
+    assert load_experiment(tmp_path / "one").config.walls is not None
+    assert "No bar is seen" not in capsys.readouterr().out
 
 
 def test_bars_need_some_rods(tmp_path, capsys):
