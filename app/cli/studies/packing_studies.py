@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...process.errors import InputError
-from ..commands.run import Request, open_run
+from ..run_request import Request, open_run
 from ..terminal import progress_of, table_console
 from .study_request import StudyRequest
 

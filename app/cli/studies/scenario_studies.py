@@ -7,7 +7,7 @@ from typing import get_args
 
 from ...process.atomic import write_atomically
 from ...synthetic.scenarios.preset_names import ScenarioName
-from ..commands.run import Request, open_run
+from ..run_request import Request, open_run
 from ..terminal import print_line, progress_of, table_console
 from .study_request import StudyRequest
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal
 
 from ...process.errors import InputError
 from ...synthetic.scenarios.preset_names import ScenarioName
@@ -30,9 +30,9 @@ StudySubject = Literal[
     "fringes",
     "perturbation",
 ]
-SUBJECTS: tuple[StudySubject, ...] = get_args(StudySubject)
-SIMULATED = tuple(each for each in SUBJECTS if each != "real")
 OF_SCENARIOS: tuple[StudySubject, ...] = ("worlds", "trust", "mixture", "numbers", "intervals", "report", "budget")
+OF_PACKINGS: tuple[StudySubject, ...] = ("paper", "accuracy", "status", "uncertainty", "fringes")
+SIMULATED: tuple[StudySubject, ...] = (*OF_PACKINGS, *OF_SCENARIOS, "perturbation")
 # The subjects to which an option applies; --quiet applies to all.
 APPLIES_TO: Mapping[str, tuple[StudySubject, ...]] = {
     "PATH": ("real", "perturbation", "paper"),
