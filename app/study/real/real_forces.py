@@ -15,6 +15,7 @@ from jaxtyping import Float
 
 from ...experiment.reading.tables import read_table
 from ...inference.snapshots import make_snapshots
+from ...process.counts import mean_of_known
 from ...process.errors import InputError
 from ...process.frame_range import FrameRange
 from ...results.results import Results, TruthContacts
@@ -213,8 +214,7 @@ def as_json(study: RealStudy) -> dict[str, object]:
 
 def mean_of(values: Sequence[float]) -> float | None:
     """Return the mean of the finite values; None without any."""
-    known = [value for value in values if np.isfinite(value)]
-    return round(float(np.mean(known)), 6) if known else None
+    return _plain(mean_of_known(values))
 
 
 def _plain(value: float) -> float | None:

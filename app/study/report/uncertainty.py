@@ -6,7 +6,6 @@ error bars are fitted on some packings and judged on others.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +28,8 @@ from ...solver.bodies.grains import Array
 from ...solver.contacts.pairs import match_values
 from ...solver.dem.dem_truth import DemTruth
 from ...solver.parallel import available_cores
-from ..scenarios.interval_coverage import COVERED, coverage
+from ..fitting.coverage import coverage_scale
+from ..scenarios.interval_coverage import coverage
 from ..truths import NEGLIGIBLE, observe, simulate, true_forces, window_starts
 
 WINDOW = 12  # photographs of one sequence
@@ -129,7 +129,7 @@ def fit_sd_weights(sample: ErrorBars, component: int) -> tuple[float, float]:
 
     x = minimize(loss, np.log([0.5, 0.8]), method="Nelder-Mead").x
     ratio = size / np.hypot(np.exp(x[0]) * ensemble_sd, np.exp(x[1]) * formula_sd)
-    scale = math.sqrt(float(np.quantile(ratio, COVERED[0])) * float(np.quantile(ratio, COVERED[1])) / 2.0)
+    scale = coverage_scale(ratio)
     a, b = (float(each) for each in np.exp(x) * scale)
     return a, b
 

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rodsight.solver.assessment.intervals.force_intervals import Group, Term
+from rodsight.study.fitting.coverage import COVERED
 from rodsight.study.scenarios.contact_errors import ContactErrors, measure_errors
-from rodsight.study.scenarios.interval_coverage import COVERED, TOLERANCE, covered, describe_violations, interval_score
+from rodsight.study.scenarios.interval_coverage import TOLERANCE, covered, describe_violations, interval_score
 from rodsight.study.scenarios.interval_fit import fit_intervals
 from rodsight.study.scenarios.scenario_score import StudyPlan
 from rodsight.study.scenarios.solved_scenario import solve_one
