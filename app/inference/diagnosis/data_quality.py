@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...solver.assessment.motion_information import DETECTABLE
 from ...solver.bodies.grains import Grains
 from ...solver.bodies.motion import Snapshot
 from ...solver.bodies.rods import RodMaterial
@@ -37,7 +38,6 @@ FEW_SLIDING = 0.1
 COARSE_STEPS = 2.0  # of REFERENCE_STEP, beyond which closer photographs are advised
 AMBIGUOUS = (0.05, 0.95)  # P(touch) between which a pair is ambiguous
 TOUCHING = 0.5  # P(touch)
-DETECTABLE = 3.0  # standard deviations of a measured sliding beyond which it is detected
 
 
 @dataclass(frozen=True, slots=True)

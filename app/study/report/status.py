@@ -24,10 +24,9 @@ from ...solver.assessment.trust import motion_assessment
 from ...solver.bodies.grains import Array
 from ...solver.frame_forces import FrameStatus
 from ..fitting.coverage import coverage_scale
-from ..truths import simulate
+from ..truths import NOISES, simulate
 from .status_sample import FAULTS, StatusSample, observe_status
 
-NOISES = (0.0, 1e-5, 2e-5, 4e-5)  # [m]
 MAX_BELOW_TRUST = 0.06  # fraction of frames that may have r below their trust
 FAULT_WEIGHT = 0.5  # of a faulty frame in the fit of the trust: most real sequences have no fault
 CHANGED = 0.2  # 1 − correlation with the previous true forces, above which a packing has rearranged

@@ -30,10 +30,7 @@ from ...solver.dem.dem_truth import DemTruth
 from ...solver.parallel import available_cores
 from ..fitting.coverage import coverage_scale
 from ..scenarios.interval_coverage import coverage
-from ..truths import NEGLIGIBLE, observe, simulate, true_forces, window_starts
-
-WINDOW = 12  # photographs of one sequence
-NOISES = (1e-5, 2e-5, 4e-5)  # [m]
+from ..truths import NEGLIGIBLE, NOISES, WINDOW, observe, simulate, true_forces, window_starts
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +96,7 @@ def measure_error_bars(
     progress: Progress = no_progress,
 ) -> ErrorBars:
     """Solve loading and unloading windows of all truths at every noise [m] with an ensemble."""
-    noises = NOISES if noises is None else noises
+    noises = NOISES[1:] if noises is None else noises
     jobs = [
         (t, start, noise) for t in range(len(truths)) for start in window_starts(truths[t], WINDOW) for noise in noises
     ]

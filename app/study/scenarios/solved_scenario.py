@@ -47,7 +47,7 @@ def solve_one(plan: StudyPlan, scenario: ScenarioName, seed: int, *, members: in
     with TemporaryDirectory() as folder:
         made = make_planned(plan, Path(folder), scenario, seed)
         experiment = load_experiment(made.folder, plan.settings)
-        solution = solve_scenario(experiment)
+        solution = solve_scenario(experiment, no_progress)
         again = _solve_again(experiment, solution.sequence, members) if members else ()
         return SolvedScenario(scenario, seed, solution, true_forces(experiment, solution.sequence), again)
 
