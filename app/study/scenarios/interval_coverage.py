@@ -39,7 +39,7 @@ GROUPS: dict[str, Callable[[ContactErrors], NDArray[np.bool_]]] = {
     "strong": lambda e: _later(e) & (e.force[:, 0] > STRONG),
     "sliding": lambda e: _later(e) & e.sliding,
     "wall": lambda e: _later(e) & e.wall,
-    "doubtful": lambda e: _later(e) & e.doubtful,
+    "ambiguous": lambda e: _later(e) & e.ambiguous,
     FIRST: lambda e: ~_later(e),
 }
 
