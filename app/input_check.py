@@ -31,7 +31,7 @@ class InputReport:
     expected_correlation: float = UNKNOWN  # of the normal forces; NaN: not predicted
     expected_low: float = UNKNOWN  # with `expected_high`, an interval with a coverage of two thirds
     expected_high: float = UNKNOWN
-    sufficient: bool | None = None  # whether forces with r >= .9 are expected; None: not predicted
+    sufficient: bool | None = None  # whether r >= .9 is expected and no cause is named; None: not predicted
     notes: tuple[str, ...] = field(default_factory=tuple)  # remarks on the input
     diagnosis: tuple[Finding, ...] = field(default_factory=tuple)  # causes of what contradicts the forces
     tracked: int | None = None  # grains with a pose in at least one frame of given tracks; None: photographs

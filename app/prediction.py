@@ -35,7 +35,7 @@ MOST_STATED = 0.99  # expected r(f_n)
 # Expected r(f_n) from which on the forces fit the given friction, so that another one is not named: the sliding of few
 # contacts, which one wrong radius can contradict, is weaker evidence.
 FITTING = 0.985
-DOUBTFUL = 0.97  # expected r(f_n) below which rival inputs are compared
+COMPARED = 0.97  # expected r(f_n) below which rival inputs are compared
 NO_EXPECTATION = (math.nan, math.nan, math.nan)
 NOT_PREDICTED = (
     "The accuracy of the forces is not predicted: a prediction needs grains and walls seen in two consecutive "
@@ -148,9 +148,9 @@ def predict_accuracy(
     try:
         inputs = with_softness(inputs)
         trial = solve_trial(inputs, PREDICTED_PHOTOGRAPHS, InferenceObserver(progress))
-        doubtful = trial is not None and trial.expected[0] < DOUBTFUL
-        doubted = solve_trial(inputs, observer=InferenceObserver(progress)) if doubtful else None
-        found = diagnose(inputs, doubted, progress)
+        compared = trial is not None and trial.expected[0] < COMPARED
+        given = solve_trial(inputs, observer=InferenceObserver(progress)) if compared else None
+        found = diagnose(inputs, given, progress)
         if trial is not None and trial.expected[0] >= FITTING:
             found = [each for each in found if each.cause != "friction"]
         unsolved = trial is None or math.isnan(trial.expected[0])
@@ -160,12 +160,12 @@ def predict_accuracy(
 
 
 def track_first_photographs(
-    experiment: Experiment, progress: Progress = no_progress, notify: Callable[[str], None] = lambda _: None
+    experiment: Experiment, notify: Callable[[str], None] = lambda _: None
 ) -> tuple[Tracks, WallTracks | None]:
     """Track the first photographs without storing the result. Raises InputError where no grain is found."""
     from .tracking.stage import track_first  # imported late: given tracks do not need it
 
-    return track_first(experiment, PREDICTED_PHOTOGRAPHS, progress, notify)
+    return track_first(experiment, PREDICTED_PHOTOGRAPHS, no_progress, notify)
 
 
 def measure_photographs(experiment: Experiment, rods: GrainGuess | None) -> PictureQuality:

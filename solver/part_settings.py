@@ -6,12 +6,14 @@ are opened, before the libraries of numerics are loaded.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 Keep = Literal["log", "all", "none"]
 # Standard deviation of u_t over that of a position: two grains, translation and rotation, two photographs.
 SLIP_SIGMAS = 2.8
+REFERENCE_STEP = math.radians(0.25)  # [rad] shear between photographs at which forces are followed best
 # Largest trust in forces of soft grains from their overlaps.
 MAX_TRUST_MEASURED = 0.96  # the gaps show the overlaps; r .98 to .996 on simulated grains
 MAX_TRUST_STATED = 0.65  # softness is specified and no gap shows it; r .66 to .74 on photoelastic discs
@@ -41,7 +43,7 @@ class ConvexSettings:
     slip_noise: float = 1.5 * SLIP_SIGMAS  # [σ of a position] smaller slips count as zero
     # ν where noise hides all sliding. On the apparatus at .0267° a photograph, where it is half of the sliding or more,
     # the scale of forces was .956 and .990 without it and is .973 and .994 (seeds 2 and 1, 20 photographs).
-    noise_share: float = 0.06
+    noise_fraction: float = 0.06
     projection_weight: float = 0.5  # λ of the projection onto equilibrium
     tolerance: float = 3e-8  # of the interior-point method; force errors then stay below 0.1 %
 

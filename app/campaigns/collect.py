@@ -18,6 +18,7 @@ import pyarrow.parquet
 from ..exchange.data_package import write_description
 from ..exchange.tidy_tables import TableName, make_table
 from ..process.atomic import replacing, write_atomically
+from ..process.counts import known_or_none, mean_of_known
 from ..results.hdf5.store import load_results
 from ..run_folder import RESULTS, SUMMARY
 from .plan import Case
@@ -150,5 +151,5 @@ def _rms(deviations: Iterable[float]) -> float | None:
 
 
 def _mean(values: Sequence[float | None]) -> float | None:
-    known = [each for each in values if each is not None]
-    return round(sum(known) / len(known), 4) if known else None
+    mean = known_or_none(mean_of_known(values))
+    return None if mean is None else round(mean, 4)

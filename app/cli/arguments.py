@@ -105,8 +105,13 @@ def refuse_unused(command: str, given: Mapping[str, object], when: str) -> None:
         When these options do not apply, such as "without --follow".
     """
     for option, value in given.items():
-        if value not in (None, False, ()):
+        if was_given(value):
             raise InputError(command, option, f"does not apply {when}")
+
+
+def was_given(value: object) -> bool:
+    """Return whether an option was given; None, False and an empty tuple stand for one that was not."""
+    return not (value is None or value is False or value == ())
 
 
 def worker_count(workers: int | None) -> int:

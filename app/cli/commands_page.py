@@ -35,7 +35,7 @@ def _section(command: Command) -> list[str]:
     options = "\n".join(_row(name, meaning) for name, meaning in _options(command))
     return [
         f"### {name_of(command)}",
-        " ".join(text.split()),
+        *(" ".join(each.split()) for each in text.split("\n\n") if each.strip()),
         f"```sh\n{' '.join(example.split())}\n```",
         f"```text\n{options}\n```",
     ]

@@ -12,6 +12,7 @@ from ..solver.bodies.grains import Array
 from ..solver.frame_forces import FrameForces
 
 WEAK_FRACTION = 0.5  # of the mean f_n: below it a contact is drawn thin and grey
+DIFFERENCE_FRACTION = 0.4  # of the range: the difference of forces drawn widest and brightest
 TOP_QUANTILE = 0.998  # of all f_n > 0: above it width and colour are constant
 
 

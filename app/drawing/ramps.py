@@ -50,11 +50,11 @@ def even_path(corners: Array, count: int) -> Array:
     return np.stack([np.interp(at, length, corners[:, axis]) for axis in range(3)], axis=1)
 
 
-def make_ramp(path: tuple[tuple[float, float, float], ...], count: int = RAMP_LEVELS) -> NDArray[np.uint8]:
-    """Return a ramp (count, 4) of opaque sRGB colours along a path through OKLab."""
-    linear = np.clip(linear_srgb(even_path(lab_from_lch(path), count)), 0.0, 1.0)
+def make_ramp(path: tuple[tuple[float, float, float], ...]) -> NDArray[np.uint8]:
+    """Return a ramp (RAMP_LEVELS, 4) of opaque sRGB colours along a path through OKLab."""
+    linear = np.clip(linear_srgb(even_path(lab_from_lch(path), RAMP_LEVELS)), 0.0, 1.0)
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    ramp = np.full((count, 4), 255, np.uint8)
+    ramp = np.full((RAMP_LEVELS, 4), 255, np.uint8)
     ramp[:, :3] = np.round(255.0 * srgb)
     return ramp
 

@@ -14,6 +14,7 @@ from scipy.spatial import ConvexHull, KDTree
 from ..process.counts import state_count
 from ..process.errors import InputError
 from ..solver.bodies.grains import Array
+from ..solver.bodies.rods import EARTH_GRAVITY
 from ..solver.bodies.wall_shapes import (
     IN,
     OUT,
@@ -161,7 +162,8 @@ def implausible_loads(material: MaterialSection, tracks: Tracks, walls: WallTrac
     width = float(np.ptp(tracks.position[0, here, 0])) if here.any() else 0.0
     if width <= 0.0:
         return []
-    weight = material.density * 9.81 * float(np.sum(np.pi * tracks.radius[here] ** 2)) / width  # [Pa], per length
+    area = float(np.sum(np.pi * tracks.radius[here] ** 2))
+    weight = material.density * EARTH_GRAVITY * area / width  # [Pa], per length
     usual = walls.usual_pressure(material.length)
     for w in np.flatnonzero(walls.loaded & np.isnan(walls.pressure)).tolist():
         name, pressure = walls.name[w], float(usual[w]) / _touched_fraction(tracks, walls, w)

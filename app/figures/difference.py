@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from ..drawing.force_range import ForceRange
+from ..drawing.force_range import DIFFERENCE_FRACTION, ForceRange
 from ..results.comparison import Comparison
 from ..results.results import Results
 from ..solver.bodies.walls import Walls
@@ -16,7 +16,6 @@ from ..solver.contacts.pairs import align
 from .figure_style import Width, add_title, new_figure
 from .force_network import bounds_of, branch_lines, describe_frame, draw_packing, line_widths
 
-DIFFERENCE_FRACTION = 0.4  # of the range of forces: the difference drawn widest, as in the recording
 MORE, LESS = "#e8833a", "#0b3c8c"  # of which the second is darker, so that the sign shows in grey
 
 

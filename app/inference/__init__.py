@@ -1,1 +1,1 @@
-"""From tracks to forces: the one road for runs, sensitivity and studies. Stands on experiment."""
+"""From tracks to forces: the one road for runs, sensitivity and studies. Depends on experiment."""

@@ -34,10 +34,10 @@ class CorrectedSequence:
     tuning: RadiusTuning | None  # None: not requested
     boundary: Boundary | None  # None: used as given
     failed: Mapping[int, str]  # unusable frames with the reason; their snapshots are interpolated
+    base_gravity: float  # [m/s²] onto the base
     wall_friction: WallFriction | None = None  # measured at walls; None: given, or as between rods
     friction_measured: bool = False  # whether the friction between rods was measured
-    base_gravity: float = 9.81  # [m/s²] onto the base
-    noise_remark: str = ""  # where the measured noise contradicts the stated one
+    remark: str = ""  # all corrections that the first frame reports, in a phrase
     lens: CameraDistortion | None = None  # None: not sought
     jumping: bool = False  # whether poses that jump were taken out
     softness_hidden: bool = False  # whether errors may hide that grains, taken for hard, are soft

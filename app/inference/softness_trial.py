@@ -54,4 +54,4 @@ def correct_by_trial(inputs: Inputs) -> tuple[Inputs, CorrectedSequence]:
         f'{100.0 * math.exp(-2.0 * rise):.0f} % (if grains are hard: material.stiffness = "rigid")'
     )
     changed = correct_sequence(soft)
-    return soft, replace(changed, noise_remark="; ".join(filter(None, (changed.noise_remark, remark))))
+    return soft, replace(changed, remark="; ".join(filter(None, (changed.remark, remark))))

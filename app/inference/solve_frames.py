@@ -72,8 +72,8 @@ def solve_frames(sequence: CorrectedSequence, store: FrameStore, observer: Infer
 
 def with_remarks(sequence: CorrectedSequence, forces: FrameForces) -> FrameForces:
     """Report the measured noise of all frames with the first, and which contacts belong to interpolated rods."""
-    if forces.frame == 0 and sequence.noise_remark:
-        forces = replace(forces, reason=f"{sequence.noise_remark}; {forces.reason}")
+    if forces.frame == 0 and sequence.remark:
+        forces = replace(forces, reason=f"{sequence.remark}; {forces.reason}")
     interpolated = sequence.tracks.frame(forces.frame).interpolated[0]
     if not interpolated.any():
         return forces

@@ -13,6 +13,7 @@ LEAD = re.compile(r"^- \*\*(.+?)\*\*", re.MULTILINE)  # the lead of a list item 
 CODE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 HEADING_WEIGHT, TITLE_WEIGHT = 10, 5  # of a word; in the text each occurrence counts 1, at most TITLE_WEIGHT
 # Pages that are listed after the others.
+MOST_FOUND = 8  # sections
 REFERENCE = {"commands.md", "settings.md", "schema.md", "api.md", "glossary.md", "troubleshooting.md"}
 STOP_WORDS = "a an and are as at by can do does for from get how i if in is it may my of on or the to what with"
 SIGNS = {"mu": "μ", "phi": "φ"}  # the pages print the sign
@@ -33,7 +34,7 @@ class Section(NamedTuple):
         return f"{self.page.removesuffix('.md')}.html#{anchor(self.heading)}"
 
 
-def find_sections(words: str, most: int = 8) -> list[Section]:
+def find_sections(words: str) -> list[Section]:
     """Return sections that contain all words (or their beginnings), best match first; none without words."""
     typed = map(str, re.findall(r"[^\s,;?!]+", words.lower()))
     wanted = [SIGNS.get(word, word) for word in typed if word not in IGNORED]
@@ -41,7 +42,7 @@ def find_sections(words: str, most: int = 8) -> list[Section]:
         return []
     found = [(_score(section, wanted), section) for section in _sections()]
     found.sort(key=lambda each: (each[1].page in REFERENCE, -each[0]))
-    return [section for score, section in found if score > 0][:most]
+    return [section for score, section in found if score > 0][:MOST_FOUND]
 
 
 def _sections() -> list[Section]:

@@ -34,6 +34,7 @@ WARNINGS = {
     "app/inference/diagnosis/data_quality.py": ("describe", "obstacle"),
     "app/prediction.py": ("verdict",),
 }  # fmt: skip
+WORD = re.compile(r"[^\W\d_]{2,}")
 RAISES = re.compile(r"Error\(|\.error\(|_error\(|notes\.append\(")  # code without a match is not parsed
 UNKNOWN = "…"
 MIN_WORDS = 4  # of a warning
@@ -73,7 +74,7 @@ def _messages_of(source: str, tree: ast.Module) -> Iterator[Message]:
         named = _assigned(scope) if scope is not tree else {}
         for call in (node for node in _own(scope) if isinstance(node, ast.Call)):
             text = _text_of_call(source, call, named)
-            if text.replace(UNKNOWN, "").strip(" :.'\"?()"):
+            if len(WORD.findall(text)) > 1:  # fewer name a place, and the cause is known at run time only
                 kind = "warning" if _called(call) == "append" else "error"
                 yield Message(kind, source, " ".join(text.split()))
 

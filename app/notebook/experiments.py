@@ -123,7 +123,7 @@ def check(
     experiment : path
         Folder of the experiment, or its experiment.toml.
     predict : bool
-        Predict the accuracy, from three photographs or the first frames of given tracks.
+        Predict the accuracy, from the first twelve photographs or frames of given tracks.
     settings : mapping, optional
         Values by the keys of experiment.toml, which they override.
     progress : callable, optional
@@ -133,8 +133,9 @@ def check(
     -------
     pandas.Series
         name, frames, photographs, grains, walls, boundaries; expected_correlation of the normal forces with
-        expected_low and expected_high (coverage of two thirds); sufficient: whether the motion determines the forces;
-        notes; prediction in sentences.
+        expected_low and expected_high (coverage of two thirds); sufficient: whether r of .9 or more is expected and no
+        cause of wrong forces is named; notes; diagnosis: these causes; tracked: grains with a pose, of given tracks;
+        unused: columns of tables that are not used; prediction in sentences.
 
     Raises
     ------

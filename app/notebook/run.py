@@ -290,9 +290,10 @@ class Run:
 
         Parameters
         ----------
-        name : {'forces', 'density', 'rose', 'stress', 'time', 'truth', 'difference'}
-            Force network, P(f), rose of contact directions, stress, curves over time, inferred over true forces, or
-            their difference as a map.
+        name : {'forces', 'density', 'rose', 'stress', 'time', 'sheet', 'kinematics', 'fringes', 'truth', 'difference'}
+            Force network, P(f), rose of contact directions, stress, curves over time, small networks of a long
+            run, motion beyond the mean field, fringes beside the forces, inferred over true forces, or their difference
+            as a map.
         frame : int, optional
             Default: the last settled frame.
         width : {'single', 'double'}

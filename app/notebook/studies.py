@@ -6,7 +6,7 @@ import csv
 import io
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -173,7 +173,7 @@ def campaign(
     else:
         file = Path(table)
         folder = Path(out) if out is not None else Path("runs") / file.stem
-    cases = [replace(case, record=recordings) for case in read_plan(file)]
+    cases = read_plan(file, record=recordings)
     scheduler = workers if isinstance(workers, str) else None
     done = run_campaign(
         cases, folder, workers=_processes(workers), scheduler=scheduler, progress=progress or shown_progress()

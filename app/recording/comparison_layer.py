@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from ..drawing.accumulated_strain import accumulated_strains
 from ..drawing.force_range import ForceRange
-from ..experiment.units import Scale
 from ..process.atomic import replacing
 from ..results.comparison import Comparison, FieldFrame
 from ..solver.bodies.grains import Array
@@ -48,11 +47,11 @@ ANGLES = tuple(f"/compare/{which}/{name}" for which in ("first", "second") for n
 SUMMARY = "/compare/summary"
 
 
-def record_comparison(comparison: Comparison, path: Path | str, *, scale: Scale | None = None) -> int:
+def record_comparison(comparison: Comparison, path: Path | str) -> int:
     """Write a comparison as a recording and return its size [bytes]."""
     path, base = Path(path), comparison.base
     tracks = tracks_in_cell(base.tracks, base.walls)
-    canvas = Canvas.around(tracks, scale, None, base.walls)
+    canvas = Canvas.around(tracks, None, None, base.walls)
     scene = Scene(
         f"{comparison.first.name} and {comparison.second.name}", tracks, base.walls, base.grains, base.friction,
         base.configuration, canvas, ForceStyle.on(canvas, _range_of(comparison)),

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ..experiment.reading.input_files import InputFiles
 from ..experiment.reading.tables import Table, check_frames, check_unique, read_table
 from ..process.errors import InputError
 from ..process.frame_range import ALL_FRAMES, FrameRange
@@ -32,7 +31,6 @@ def read_truth(
     frame_count: int,
     frames: FrameRange = ALL_FRAMES,
     unseen: NDArray[np.int64] | None = None,
-    inputs: InputFiles | None = None,
 ) -> TruthContacts:
     """Read a table of true contact forces.
 
@@ -53,15 +51,13 @@ def read_truth(
         Photographs of the results; the returned frames are rows of the results.
     unseen
         Ids of `true_ids`, which the table may contain although no grain of the results has them.
-    inputs
-        Reads the file and refuses it if it has changed since it was first read.
 
     Raises
     ------
     InputError
         A grain or wall is unknown, or frames count from one.
     """
-    table = file if isinstance(file, Table) else read_table(file, TRUTH_COLUMNS, inputs)
+    table = file if isinstance(file, Table) else read_table(file, TRUTH_COLUMNS)
     number, i = table.integers("frame") - frames.start, table.integers("i")
     if frames == ALL_FRAMES and len(number) and number.min() > 0 and number.max() >= frame_count:
         raise table.error(

@@ -45,14 +45,12 @@ class ErrorBudget:
         )  # fmt: skip
 
 
-def budget_cases(
-    inputs: VariedInputs, friction: float = FRICTION_SD, radius_sd: float = MIN_RADIUS_SD
-) -> dict[str, Case]:
-    """Cases to solve, by cause, the method excluded; friction, radius_sd: relative uncertainties."""
+def budget_cases(inputs: VariedInputs, radius_sd: float = MIN_RADIUS_SD) -> dict[str, Case]:
+    """Cases to solve, by cause, the method excluded; radius_sd: relative uncertainty."""
     cases = {
         "positions": Case((("position_noise", 1.0), ("rotation_noise", 1.0)), SEED),
         "radii": Case((("radius_scatter", max(radius_sd, MIN_RADIUS_SD)),), SEED),
-        "friction": Case((("friction", 1.0 + friction), ("wall_friction", 1.0 + friction)), SEED),
+        "friction": Case((("friction", 1.0 + FRICTION_SD), ("wall_friction", 1.0 + FRICTION_SD)), SEED),
         "contacts": Case((("overlap", OVERLAP_FACTOR),), SEED),
     }
     if len(inputs.frames) > 3:  # with fewer, every second one leaves no motion

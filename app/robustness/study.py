@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..inference.inputs import Inputs
+from ..process.counts import mean_of_known
 from ..process.errors import UndeterminedError
 from ..process.progress import Progress, no_progress
 from ..results.results import Results, TruthContacts
@@ -101,11 +102,12 @@ def compare(run: Networks, nominal: Nominal) -> Effect:
     return Effect(
         frames=int(late.sum()),
         **_means(own, ""),
-        friction_angle_change=_mean(np.degrees(angle)),
-        principal_direction_change=_mean(np.degrees(0.5 * np.angle(np.exp(2j * direction)))),  # of an axis: modulo 180°
-        pressure=_mean(run.pressure[rows]),
-        contacts=_mean(run.contact_count[rows].astype(np.float64)),
-        trust=_mean(run.trust[rows]),
+        friction_angle_change=mean_of_known(np.degrees(angle)),
+        # Of an axis: modulo 180°.
+        principal_direction_change=mean_of_known(np.degrees(0.5 * np.angle(np.exp(2j * direction)))),
+        pressure=mean_of_known(run.pressure[rows]),
+        contacts=mean_of_known(run.contact_count[rows].astype(np.float64)),
+        trust=mean_of_known(run.trust[rows]),
         **_means(true, "true_"),
     )
 
@@ -169,9 +171,4 @@ class EffectLog:
 
 
 def _means(agreement: Sequence[Agreement], prefix: str) -> dict[str, Any]:
-    return {prefix + name: _mean(np.array([getattr(each, name) for each in agreement])) for name in AGREEMENTS}
-
-
-def _mean(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else math.nan
+    return {prefix + name: mean_of_known(np.array([getattr(each, name) for each in agreement])) for name in AGREEMENTS}

@@ -14,11 +14,9 @@ from rich.table import Table
 from ..inference.infer_sequence import infer_sequence
 from ..process.progress import Progress, no_progress
 from ..solver.dem.dem_truth import DemTruth
-from .truths import agreement_of, observe, simulate, window_starts
+from .truths import NOISES, WINDOW, agreement_of, observe, simulate, window_starts
 
-WINDOW = 12  # photographs of one sequence
 SHOWN = (1, 3, 5, 10)  # frames of the table
-NOISES = (0.0, 1e-5, 2e-5, 4e-5)  # [m]
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,13 +23,15 @@ from ..solver.nlgs.chain import ChainSettings
 from ..solver.sequence.settings import SequenceSettings
 from ..solver.statistics.agreement import Agreement, compare_forces
 from ..synthetic.dense_packing import prepare_packing
+from ..synthetic.experiment_files import FINEST_PRECISION
 from ..synthetic.scenarios.scenario_folder import load_truth, save_truth
 from ..tracks import Tracks, TrackStatus, WallTracks
 
 STEP = 0.25  # [°] of shear between photographs
 REVERSAL_ANGLE = 15.0  # [°] of shear at which the direction is reversed
 INTERVAL = 52.0  # [s] between photographs at the real test's rate
-FINEST_PRECISION = 1e-6  # [m] stated for exact positions
+WINDOW = 12  # photographs of one sequence
+NOISES = (0.0, 1e-5, 2e-5, 4e-5)  # [m] of positions
 NEGLIGIBLE = 1e-3  # over the mean f_n: contacts whose inferred and true forces are below it are left out of errors
 
 

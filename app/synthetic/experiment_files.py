@@ -19,6 +19,8 @@ from ..solver.dem.dem_truth import DemSettings, DemTruth
 
 Ids = NDArray[np.integer]
 
+FINEST_PRECISION = 1e-6  # [m], claimed of tracks without noise: tables are rounded, rods are elastic
+
 
 @dataclass(frozen=True, slots=True)
 class StatedInputs:

@@ -31,7 +31,6 @@ SHEAR_RATE = 4.8e-3  # [°/s], of the real test; gives the times of the photogra
 STEEPEST = 30.0  # [°]
 LEAST_GRAINS = 12
 MARGIN = 0.006  # [m], of visible backing around the frame
-FINEST_PRECISION = 1e-6  # [m], claimed of tracks without noise: tables are rounded, rods are elastic
 LARGEST_RADIUS_ERROR = 0.05  # of the stated radii, either way
 # The apparatus 1γ2ε as its authors describe it.
 PLATE_LOAD, PLATE_LENGTH = 1438.0, 0.5  # [N], [m]; a smaller frame has the same load per length
@@ -315,7 +314,7 @@ def _write_tracks(out: Path, taken: _Photographed, noise: float) -> str:
 positions = "tracks.csv"
 grains = "grains.csv"
 times = "times.csv"
-precision = {max(noise, FINEST_PRECISION)}
+precision = {max(noise, experiment_files.FINEST_PRECISION)}
 """
 
 

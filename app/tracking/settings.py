@@ -22,7 +22,7 @@ class TrackingSettings:
 
     def __post_init__(self) -> None:
         if not 0.2 <= self.patch_fraction <= 1.0:
-            raise ValueError(f"patch_share must be in [0.2, 1], not {self.patch_fraction}")
+            raise ValueError(f"patch_fraction must be in [0.2, 1], not {self.patch_fraction}")
         for name in ("tolerance", "step_limit", "search_window"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be positive, not {getattr(self, name)}")

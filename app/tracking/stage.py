@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -28,6 +27,7 @@ from ..process.progress import Progress, no_progress
 from ..results.checkpoint import Checkpoint
 from ..solver.bodies.grains import Array
 from ..solver.bodies.wall_shapes import OUT, STRAIGHT, bounding_distance
+from ..solver.parallel import available_cores
 from ..tracks import Tracks, WallTracks
 from . import DETECTIONS, PICTURES
 from .corner_discs import CORNERS, follow_corners
@@ -94,7 +94,7 @@ def track_photographs(
     """
     section, tuning = experiment.config.photographs, experiment.config.tracking
     assert section is not None
-    workers = tuning.workers or _cores()
+    workers = tuning.workers or available_cores()
     photographs = experiment.photographs()
     count = len(photographs)
     first = photographs[0]
@@ -251,11 +251,6 @@ def _sought(radii: Sequence[float], scale: Scale) -> str:
     if not radii:
         return f"; {cure}"
     return f" of the radii photographs.radii, {pixels} px at this pixel_size: correct one of both, or {cure}"
-
-
-def _cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _channel_messages(experiment: Experiment, settings: DetectionSettings, detection: Detection) -> list[str]:

@@ -311,10 +311,10 @@ def _logarithm(table: dict[str, Any], measure: float) -> float:
 
 
 def _table(evidence: Evidence) -> dict[str, Any]:
-    """The table for the evidence at hand.
+    """Return the fitted table for the kind of evidence.
 
-    Of overlaps of soft grains; of the motion alone; of both estimates, under a known load or without one, where
-    balance determines less of the forces.
+    There is one for overlaps of soft grains, one for the motion alone, and two for both estimates: under a known load,
+    and without one, where balance determines less of the forces.
     """
     tables = FITTED["expected_correlation"]
     if rests_on_overlaps(evidence) and not math.isnan(evidence.position_agreement) and "overlaps" in tables:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..convex.friction_check import COVERAGE_FACTOR, FrictionCheck
 from ..frame_forces import FrameForces, FrameStatus
+from ..part_settings import REFERENCE_STEP
 from ..statistics.sliding import contact_state, sliding_probability_at
 from .evidence import Evidence
 from .expected_correlation import contradict, losses
@@ -18,7 +19,6 @@ from .intervals.force_intervals import correlation_by_intervals, widen_for_frict
 from .reasons import join_reasons
 from .trust import Assessment, interior_limit, motion_assessment, unseen_penalty
 
-COARSE_STEP = math.radians(0.25)  # [rad] shear of a step beyond which forces cannot be followed
 SOFT_CHAIN_LOSS = 0.15  # where a single chain treats soft grains as hard
 BEYOND_WALL_LOSS = 12.0  # for each grain beyond a wall, per grain
 # Where boundary grains inside the packing bear more than LEAST_REACTION of all forces: of T of `pins`, `stepped_pins`,
@@ -229,7 +229,7 @@ def _contradictions(evidence: Evidence) -> list[Penalty]:
     )
     lost = losses(evidence)
     coarse = dict.fromkeys(STEP_SHOWN_BY, "")  # the step is named once, where it costs most
-    if evidence.shear > COARSE_STEP and not lost.get("coarse_step", 0.0) >= REPORTED:
+    if evidence.shear > REFERENCE_STEP and not lost.get("coarse_step", 0.0) >= REPORTED:
         coarse[max(STEP_SHOWN_BY, key=lambda name: lost.get(name, 0.0))] = f": {moved}"
     noisy = lost.get("noise", 0.0) > REPORTED
     hidden = f"a noise of {1e6 * found.noise:.3g} µm hides the overlaps" if noisy else ""

@@ -1,4 +1,4 @@
-"""Several reasons in one text, from which each can be had again."""
+"""Several reasons in one text, from which each can be recovered."""
 
 from __future__ import annotations
 

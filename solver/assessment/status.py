@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..frame_forces import FrameStatus
+from ..part_settings import REFERENCE_STEP
 from .evidence import Evidence
 from .expected_correlation import fraction_seen
 from .fitted import FITTED
@@ -27,8 +28,7 @@ LOAD_FRACTIONS = (0.62, 2.5)
 SETTLED_CORRECTION = 0.15  # ε below which a frame can count as settled
 SETTLED_DIFFERENCE = 0.04  # H below which a frame can count as settled
 SETTLING_FRAMES = 2  # after which the mean correlation is within .005 of that of later frames, at 0 to 40 µm of noise
-REARRANGING_UNBALANCE: float = FITTED["status"]["rearranging_residual"]  # ū at REFERENCE_SHEAR between photographs
-REFERENCE_SHEAR = math.radians(0.25)
+REARRANGING_UNBALANCE: float = FITTED["status"]["rearranging_residual"]  # ū at REFERENCE_STEP between photographs
 # Fraction of the inferred force pattern that is new since the last photograph, above which no frame is settled. The
 # members keep part of the previous forces, so it means a fifth of the true pattern. It is .06 at .25° of shear and .2
 # at 1°.
@@ -40,7 +40,7 @@ def rearranging_level(shear: float) -> float:
 
     The level does not fall below .015: at .1° and less a smaller one takes noise for events.
     """
-    return REARRANGING_UNBALANCE * float(np.clip((shear / REFERENCE_SHEAR) ** 1.5, 0.4, 4.0))
+    return REARRANGING_UNBALANCE * float(np.clip((shear / REFERENCE_STEP) ** 1.5, 0.4, 4.0))
 
 
 def is_suspect(evidence: Evidence) -> bool:
@@ -109,7 +109,7 @@ def _describe_change(evidence: Evidence) -> str:
     change_words = (
         f"{100.0 * change:.0f} % of the force pattern is new since the last photograph, {shear:.2g}° of shear ago"
     )
-    if evidence.shear <= REFERENCE_SHEAR:
+    if evidence.shear <= REFERENCE_STEP:
         return change_words
     return f"{change_words}: photographs are too far apart; take one every {shear * 0.5 * NEW_FORCES / change:.1g}°"
 

@@ -1,4 +1,4 @@
-"""Interpolated positions of lost grains, and interpolated snapshots in point of ignored frames.
+"""Interpolated positions of lost grains, and interpolated snapshots in place of ignored frames.
 
 A lost grain has no reported forces, but its neighbours were in equilibrium with it. Without it they would move into
 the hole, and one missing grain in a hundred ruins the forces of the whole packing. The solver therefore keeps the

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from .grains import Array, Grains
 from .packing import Material, Packing
 
+EARTH_GRAVITY = 9.81  # [m/s²]
+
 
 @dataclass(frozen=True, slots=True)
 class RodMaterial:
@@ -23,7 +25,7 @@ class RodMaterial:
     formal_weight: float = 0.0  # η in [0, ½]
     gravity: tuple[float, float] = (0.0, 0.0)  # [m/s²]
     base_friction: float = 0.0  # coefficient between the rods and the base on which they slide
-    base_gravity: float = 9.81  # [m/s²] normal to the picture
+    base_gravity: float = EARTH_GRAVITY  # [m/s²] normal to the picture
     base_friction_measured: bool = False  # True: estimated from the motion
     friction_measured: bool = False  # True: `friction` is an initial guess, estimated from the motion
     stiffness: float | Literal["rigid", "estimate"] | None = (

@@ -16,17 +16,17 @@ from numpy.typing import NDArray
 from ..bodies.grains import Array
 from ..bodies.wall_shapes import STRAIGHT, all_sides, outward_normals
 from ..calibration.gaps import MeasuredSequence
+from ..part_settings import SLIP_SIGMAS
 from ..quantity import Quantity
 
 MAX_STRETCH_SDS = 4.0  # standard deviations of a length: smaller changes are noise …
 MIN_STRETCH = 1e-5  # … and of the length
 FEWEST_CHANGES = 3  # of the slope of a length over time, from which its noise is read, …
-DOUBTED = 3.0  # … times this, as few changes determine it badly
+UNCERTAIN_SLOPE = 3.0  # … times this, as few changes determine it badly
 TOUCHING = 4.0  # standard deviations of a gap, and …
 WALL_TOLERANCE = 1e-2  # … mean radii: half the width of the gaps of touching grains
 COMMON_ERROR = 5e-2  # mean radii: error of the given wall and of all radii together, at most
 FEWEST_TOUCHING = 10  # poses of touching grains from which the motion of a bar is read
-SLIP_SIGMAS = 2.8  # noise of a grain's surface displacement, of a position: as between grains
 END_FRACTIONS = np.linspace(-0.5, 1.5, 201)  # trial fractions of the change of length at end 0
 HINGE_AGREEMENT = 0.97  # of the best agreement: from here on a fraction of 0 or 1 is preferred
 
@@ -97,7 +97,7 @@ def find_wall_bars(sequence: MeasuredSequence, noise: float, end_kind: NDArray[n
 def _length_noise(length: Array, noise: float) -> Array:
     """Standard deviations (w,) of the lengths (f, w) [m] of bars whose ends have at most this noise."""
     change = np.diff(length, 2, axis=0) / np.sqrt(6.0)  # √6: second difference of independent errors
-    seen = DOUBTED * np.sqrt(np.mean(change**2, axis=0)) if len(change) >= FEWEST_CHANGES else np.inf
+    seen = UNCERTAIN_SLOPE * np.sqrt(np.mean(change**2, axis=0)) if len(change) >= FEWEST_CHANGES else np.inf
     return np.minimum(np.sqrt(2.0) * noise, seen)
 
 

@@ -1,1 +1,1 @@
-"""Constant errors of centres, radii, walls and scale, found from gaps. Stands on bodies."""
+"""Constant errors of centres, radii, walls and scale, found from gaps. Depends on bodies."""

@@ -23,10 +23,9 @@ from .fit import ROUNDS, GapFit, fit_gaps
 from .gap_statistics import GapStatistics, gap_statistics, width_gain
 from .gaps import MeasuredSequence, measure_gaps
 from .priors import FINEST_SURFACE, CalibrationPriors, narrow_priors, prior_vector
-from .scale import ScaleErrors, find_scale, scale_walls
+from .scale import SIGNIFICANT_SDS, ScaleErrors, find_scale, scale_walls
 
 MIN_GAIN = 0.1  # relative narrowing of the gaps of touching pairs below which grains are not corrected
-SIGNIFICANT_SDS = 3.0  # standard deviations above which a correction is significant, or exceeds its prior
 EXCESSIVE_NOISE = 1.3  # measured over stated noise above which the verdict contains a warning
 MISJUDGED_NOISE = 2.0  # … above which the calibration is repeated with the measured noise
 TOLERATED_IMPOSSIBLE = 0.02  # fraction of overlaps that are impossible above which the verdict contains a warning

@@ -1,1 +1,1 @@
-"""Who may touch whom, and how bodies move against one another there. Stands on bodies."""
+"""Who may touch whom, and how bodies move against one another there. Depends on bodies."""

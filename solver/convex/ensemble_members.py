@@ -82,10 +82,9 @@ def measured_slip(
     grains: Grains,
     walls: Walls,
     interval: tuple[Snapshot, Snapshot],
-    settings: ConvexSettings | None = None,
 ) -> Array:
     """Compute û_t (c,) of an interval: the value of `read_slip` alone."""
-    return read_slip(contacts, grains, walls, interval, settings).value
+    return read_slip(contacts, grains, walls, interval).value
 
 
 def read_slip(

@@ -36,7 +36,7 @@ MAX_WALL_SD = 0.15  # relative standard deviation over the frames; above it, wal
 WALL_FACTORS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.12, 1.25, 1.45, 1.7, 2.0, 2.4)
 MIN_WALL_CONTACTS = 20
 COVERAGE_FACTOR = 2.0  # standard deviations in the half-width of an interval
-FRAMES = 8  # consecutive photographs of a check
+CHECKED_FRAMES = 8  # consecutive photographs of a check
 # Fraction of sliding contacts below which they do not show the friction: noise alone makes .13 of them slide. With .13
 # to .22 the estimate was .3 to 3.4 times the truth in seven packings, with .31 to .65 .9 to 1.1 times in ten others.
 LEAST_SLIDING = 0.25

@@ -198,7 +198,7 @@ def solve_convex_member(
         Fraction of noise in the variance of the sliding, 0 … 1.
     """
     settings = settings or ConvexSettings()
-    possible = (1.0 - settings.noise_share * noise) * balance.friction * np.abs(slip)
+    possible = (1.0 - settings.noise_fraction * noise) * balance.friction * np.abs(slip)
     with np.errstate(divide="ignore"):
         ambiguity = np.maximum(0.0, -np.log(2.0 * probability))
     cost = np.concatenate([possible + settings.ambiguity_penalty * np.minimum(ambiguity, 100.0), slip])

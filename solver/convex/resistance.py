@@ -22,8 +22,8 @@ from .sliding_model import Parameter, ResistedFrame, SlidingModel, compare_model
 
 REVERSED = 0.5  # gap of the reversed motion over that of the given one, below which it is named
 ABSURD = 1.0  # friction of no rods: the motion reversed is then the better explanation, however large a gap it leaves
-AHEAD = 0.85  # gap of the winner over that of the second
-FRAMES = 4  # consecutive photographs on which models are compared
+AHEAD = 0.85  # gap of the named cause over that of the second
+COMPARED_FRAMES = 4  # consecutive photographs on which models are compared
 FEWEST = 2  # of these
 AS_GIVEN = 0.2  # relative difference of the friction of walls up to which it is the given one
 LEAST_WALLS = 12  # contacts with walls from which on their friction is a rival
@@ -74,8 +74,8 @@ def find_resistance(frames: Sequence[ResistedFrame], given: SlidingModel, worker
         None where nothing slides. The reversed motion is named if its gap is below half of that of the given one, and
         below .25, or no rival with a friction below 1 explains the sliding. Another rival is named if its parameters
         are determined, its gap is below .62 times that of the given model and of another friction alone, .85 times that
-        of every other rival, and below .25. Where none of these wins, a resistance to rolling is named that leaves less
-        than .8 of the gap of both.
+        of every other rival, and below .25. Where none of these is named, a resistance to rolling is named that leaves
+        less than .8 of the gap of both.
     """
     before = power_gap(frames, given)
     if not np.isfinite(before):
@@ -158,14 +158,14 @@ def find_in_sequence(
     settings: ContactProbabilitySettings,
     workers: int | None = 1,
 ) -> Resistance | None:
-    """Compare what may resist the sliding in up to FRAMES frames from `first` on, which have neighbours on both sides.
+    """Compare what may resist the sliding in COMPARED_FRAMES frames at most, from `first` on, with neighbours.
 
     Returns
     -------
     Resistance or None
         None with fewer than two such frames, without friction, or where nothing slides.
     """
-    numbers = range(first, min(first + FRAMES, len(snapshots) - 1))
+    numbers = range(first, min(first + COMPARED_FRAMES, len(snapshots) - 1))
     if len(numbers) < FEWEST or packing.material.friction <= 0.0 or packing.material.wall_friction <= 0.0:
         return None
     frames = resisted_frames(packing, snapshots, numbers, force_unit, settings, workers)
@@ -240,8 +240,8 @@ def _unit_drag(packing: Packing, snapshots: Sequence[Snapshot], k: int, rows: in
     present = now.present & packing.grains.free
     moved = np.nan_to_num(after.position - before.position)
     size = np.sqrt((moved**2).sum(axis=1) + 4.0 * now.sigma**2)
-    share = packing.grains.mass / packing.grains.mass.mean()
-    against = (share / np.where(size > 0.0, size, 1.0))[:, None] * moved
+    relative_mass = packing.grains.mass / packing.grains.mass.mean()
+    against = (relative_mass / np.where(size > 0.0, size, 1.0))[:, None] * moved
     drag, n = np.zeros(rows), int(present.sum())
     drag[:n], drag[n : 2 * n] = against[present, 0], against[present, 1]
     return drag

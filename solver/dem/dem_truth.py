@@ -28,7 +28,7 @@ class DemSettings:
     friction: float = 0.25
     wall_friction: float = 0.25
     rolling_friction: float = 0.0  # greatest rolling moment over f_n and the rolling radius R_i R_j / (R_i + R_j)
-    base_friction: float = 0.0  # [m/s²] coefficient × 9.81 of a base on which the rods lie; 0: none
+    base_drag: float = 0.0  # [m/s²] deceleration by a base on which the rods lie, friction × gravity; 0: none
     friction_spread: float = 0.0  # contacts between grains have friction (1 ± this) times the mean, by pairs of grains
     adhesion: float = 0.0  # [N], attraction of closed contacts
     ovality: float = 0.0  # e of elliptic sections with semi-axes R (1 ± e), between flat walls
@@ -53,7 +53,7 @@ class DemSettings:
             "friction",
             "wall_friction",
             "rolling_friction",
-            "base_friction",
+            "base_drag",
             "friction_spread",
             "adhesion",
             "ovality",

@@ -40,8 +40,8 @@ class PeriodicCell(Simulation):
         ValueError
             The settings have gravity or friction of a base.
         """
-        if any(settings.gravity) or settings.base_friction > 0.0:
-            raise ValueError("a periodic cell has neither gravity nor a base: set gravity and base_friction to 0")
+        if any(settings.gravity) or settings.base_drag > 0.0:
+            raise ValueError("a periodic cell has neither gravity nor a base: set gravity and base_drag to 0")
         grains = Grains.of_rods(radius, density=settings.density, length=settings.length)
         boundary = Boundary(CELL, np.array([*np.ravel(vectors), 0.0, 0.0], np.float64), np.zeros((2, 3)), np.zeros(4))
         super().__init__(grains, position, boundary, settings=settings, drag=drag)

@@ -61,7 +61,7 @@ class Simulation(ABC):
         if velocity is not None:
             state[:, 3:] = velocity
         self.time_step = settings.time_step_factor * float(np.sqrt(grains.mass.min() / settings.normal_stiffness))
-        base_limit = settings.base_friction * grains.mass
+        base_limit = settings.base_drag * grains.mass
         # ±√2: a contact's mean of two grains varies by the spread, whatever the radii
         sign = np.where(np.random.default_rng(n).permutation(n) % 2 == 0, 1.0, -1.0)
         self._bodies = DemBodies(

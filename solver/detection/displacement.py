@@ -80,8 +80,9 @@ def displacement_scale(before: Array, after: Array, sigma: Array) -> float:
 
     Notes
     -----
-    s² = ⟨(Δx_i − mean of Δx_j over the nearest neighbours j)²⟩ − noise variance; s is at least the noise and a
-    millionth of the neighbours' distance. In sheared packings s is 0.6 to 1.0 of the rms sliding at the contacts.
+    s² = ⟨(Δx_i − mean of Δx_j over the m nearest neighbours j)²⟩ − 2 ⟨σ_i² + ⟨σ_j²⟩ / m⟩, with Δx the displacements
+    without a rigid motion of all grains that dominates them. s is at least the rms σ of one position and a millionth of
+    the neighbours' distance. In sheared packings s is 0.6 to 1.0 of the rms sliding at the contacts.
     """
     return _displacement_scale(before.tobytes(), after.tobytes(), sigma.tobytes())
 

@@ -33,7 +33,7 @@ def smooth_candidates(
     state_gap: Array,  # (q,) [m] gap of each state, ascending; state 0 touches
     start: Array,  # (q,) probability of the states in the first frame
     transition: Array,  # (f − 1, 4, q), of `find_transition`
-    extent: Array,  # (q,) [m] width of the interval of gaps that a state stands for
+    interval_width: Array,  # (q,) [m] width of the interval of gaps that a state stands for
     stay: float,  # probability that a contact lasts one interval
     floor: float,  # least likelihood of a measurement, for outliers
     emission: Array,  # (f, q) scratch
@@ -41,11 +41,15 @@ def smooth_candidates(
     beta: Array,  # (2, q) scratch
     moved: Array,  # (3, q) scratch
     touch: Array,  # (f, c) out: probability that the pair touches
-    width: Array,  # (q,) [m²] variance of the true gap within a state
+    state_variance: Array,  # (q,) [m²] variance of the true gap within a state
     error: Array,  # (f, c) [m²] variance of the measured gap about the true one
     mean: Array,  # (f, c) [m] out: of the true gap, all photographs considered
     variance: Array,  # (f, c) [m²] out: of the true gap
 ) -> None:
+    """Smooth the gaps of every candidate over the frames, by the forward and backward recursions over the states.
+
+    Sets `touch`, `mean` and `variance`.
+    """
     frames, candidates = gap.shape
     states = len(state_gap)
     farthest = -np.log(floor) + 1e-6
@@ -77,7 +81,7 @@ def smooth_candidates(
             alpha[f, 0] = closed
             _laplace_sums(value, step[DECAY], up, down)
             for r in range(1, states):
-                alpha[f, r] = (up[r] + down[r]) * extent[r] + before[0] * step[OPENS, r]
+                alpha[f, r] = (up[r] + down[r]) * interval_width[r] + before[0] * step[OPENS, r]
             total = 0.0
             for r in range(states):
                 alpha[f, r] *= emission[f, r]
@@ -90,7 +94,7 @@ def smooth_candidates(
             beta[0, q] = 1.0
         touch[frames - 1, c] = alpha[frames - 1, 0]
         mean[frames - 1, c], variance[frames - 1, c] = _moments(
-            alpha[frames - 1], beta[0], gap[frames - 1, c], error[frames - 1, c], state_gap, width
+            alpha[frames - 1], beta[0], gap[frames - 1, c], error[frames - 1, c], state_gap, state_variance
         )
         for f in range(frames - 2, -1, -1):
             step = transition[f]
@@ -99,7 +103,7 @@ def smooth_candidates(
             for r in range(1, states):
                 b = beta[0, r] * emission[f + 1, r]
                 opened += b * step[OPENS, r]
-                value[r] = b * extent[r]
+                value[r] = b * interval_width[r]
             _laplace_sums(value, step[DECAY], up, down)
             for q in range(1, states):
                 beta[1, q] = (up[q] + down[q]) * step[STAYS_OPEN, q] + touching * step[CLOSES, q]
@@ -112,7 +116,7 @@ def smooth_candidates(
             for q in range(states):
                 beta[0, q] = beta[1, q] / total
             touch[f, c] = alpha[f, 0] * beta[1, 0] / evidence
-            mean[f, c], variance[f, c] = _moments(alpha[f], beta[0], gap[f, c], error[f, c], state_gap, width)
+            mean[f, c], variance[f, c] = _moments(alpha[f], beta[0], gap[f, c], error[f, c], state_gap, state_variance)
 
 
 @njit(cache=True, error_model="numpy")
@@ -180,16 +184,16 @@ def _laplace_sums(value, decay, up, down):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _moments(
-    alpha: Array, beta: Array, measured: float, error: float, state_gap: Array, width: Array
+    alpha: Array, beta: Array, measured: float, error: float, state_gap: Array, state_variance: Array
 ) -> tuple[float, float]:
     """Return mean and variance of the true gap, a mixture of one normal distribution per state."""
     total, first, second = 0.0, 0.0, 0.0
     for q in range(len(state_gap)):
         weight = alpha[q] * beta[q]
-        gain = 0.0 if np.isnan(measured) else width[q] / (width[q] + error)
+        gain = 0.0 if np.isnan(measured) else state_variance[q] / (state_variance[q] + error)
         middle = state_gap[q] if gain == 0.0 else state_gap[q] + gain * (measured - state_gap[q])
         total += weight
         first += weight * middle
-        second += weight * (middle * middle + width[q] * (1.0 - gain))
+        second += weight * (middle * middle + state_variance[q] * (1.0 - gain))
     first /= total
     return first, max(second / total - first * first, 0.0)

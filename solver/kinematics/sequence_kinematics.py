@@ -138,7 +138,7 @@ def measure_kinematics(
     fluctuation = np.full((frames, count, 2), np.nan)
     shear, volumetric, d2min, excess, solid = (np.full((frames, count), np.nan) for _ in range(5))
     in_band = np.zeros((frames, count), np.bool_)
-    angle, thickness, share = (np.full(frames, np.nan) for _ in range(3))
+    angle, thickness, moving_fraction = (np.full(frames, np.nan) for _ in range(3))
     for k in range(frames):
         triangle = triangulate(position[k], radius)
         solid[k] = local_solid_fraction(position[k], radius, triangle)
@@ -156,11 +156,11 @@ def measure_kinematics(
         excess[k] = rotation[k] - rotation[begin] - local.rotation
         band = find_shear_band(position[k], shear[k], triangle)
         in_band[k], angle[k], thickness[k] = band.member, band.angle, band.thickness
-        share[k] = participation(shear[k])
+        moving_fraction[k] = participation(shear[k])
     windows = _measure_windows(position, radius, noise, cells)
     return SequenceKinematics(
-        window, gradient, fluctuation, shear, volumetric, d2min, excess, solid, in_band, angle, thickness, share,
-        *windows,
+        window, gradient, fluctuation, shear, volumetric, d2min, excess, solid, in_band, angle, thickness,
+        moving_fraction, *windows,
     )  # fmt: skip
 
 

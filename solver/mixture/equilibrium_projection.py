@@ -31,13 +31,13 @@ MAX_CHANGE_EXACT, MAX_RESIDUAL = 1.0, 0.005
 MAX_CHANGE_SOFT = 0.35
 EXACT = 100.0  # factor on the price of a force residual in exact equilibrium, which leaves a hundredth of them
 RELAXATION = (0.1, 0.03, 0.01, 0.003, 0.001)  # factors on the price of a force residual, tried in this order
-KEPT_TOTAL = 1e-3  # relative change of a sum of forces that is let pass
+KEPT_TOTAL = 1e-3  # relative change of a sum of forces that is tolerated
 RAISED = 3.0  # the second field that is projected is this often as much larger as the sum of the first is too small
 MAX_RAISED = 0.3  # … but by no more than this fraction
 
 
 class WeightedSum(NamedTuple):
-    """A sum of f_n that the field in equilibrium shall have, as far as it counts."""
+    """A sum of f_n that the field in equilibrium is to have, as far as it counts."""
 
     total: float  # [N]
     weight: float  # 0 … 1 beside the sum that the projection gives
@@ -66,7 +66,7 @@ def project_mixed_field(
     settings : ConvexSettings
         Settings of the convex program; `balance` is the price of a force residual.
     wanted : WeightedSum, optional
-        Sum of f_n that the field in equilibrium shall have; None: any.
+        Sum of f_n that the field in equilibrium is to have; None: any.
     soft : bool
         Whether forces follow from the overlaps of soft grains.
 
@@ -96,9 +96,9 @@ def project_mixed_field(
     change = float(other.fn.sum()) - reached
     if not (other.converged and change * (total - reached) > 0.0):
         return found
-    share = min((total - reached) / change, 1.0)
+    step = min((total - reached) / change, 1.0)
     return replace(
-        found, fn=found.fn + share * (other.fn - found.fn), ft=found.ft + share * (other.ft - found.ft),
+        found, fn=found.fn + step * (other.fn - found.fn), ft=found.ft + step * (other.ft - found.ft),
         iterations=found.iterations + other.iterations,
     )  # fmt: skip
 

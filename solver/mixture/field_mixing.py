@@ -26,7 +26,7 @@ from ..statistics.agreement import pearson
 
 @dataclass(frozen=True, slots=True)
 class ForceField:
-    """Forces of one frame, by whichever method."""
+    """Forces of one frame, by either method."""
 
     key: Keys  # (c,) ascending
     force: Float[Array, "c 2"]  # [N] f_n, f_t

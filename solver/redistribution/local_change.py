@@ -17,9 +17,7 @@ from .nearest_forces import nearest_forces, neighbourhood, resultants
 WITHIN = 1e-3  # of the mean normal force: a friction force that is so little beyond the cone is within it
 
 
-def limit_friction(
-    grains: Grains, contacts: Contacts, fn: Array, ft: Array, *, friction: Array, reach: int = 4
-) -> tuple[Array, Array]:
+def limit_friction(grains: Grains, contacts: Contacts, fn: Array, ft: Array, *, friction: Array) -> tuple[Array, Array]:
     """Return the nearest balanced forces (c,), (c,) within cones of another coefficient, one neighbourhood at a time.
 
     Forces that are within their cones stay as they are, so a larger coefficient changes nothing.
@@ -32,15 +30,13 @@ def limit_friction(
         Forces [N].
     friction : (c,)
         The coefficient of every contact.
-    reach
-        Number of contacts from one beyond its cone within which forces change.
     """
     beyond = np.abs(ft) - friction * fn
     enough = WITHIN * max(float(np.mean(np.abs(fn))), 1e-300)
     for row in np.argsort(-beyond, kind="stable").tolist():
         if np.abs(ft[row]) - friction[row] * fn[row] > enough:  # not solved beside another one
             force, rows = np.stack([fn, ft]), np.array([row])
-            fn, ft = rebalance(grains, contacts, force, rows, friction=friction, reach=reach)
+            fn, ft = rebalance(grains, contacts, force, rows, friction=friction)
     return fn, ft
 
 

@@ -1,1 +1,1 @@
-"""Frames in order: solved by both methods, judged, reported. Stands on all the other rooms."""
+"""Frames in order: solved by both methods, judged, reported. Depends on all the other rooms."""

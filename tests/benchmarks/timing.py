@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 ROUNDS = 5
+SECONDS = {"s": 1.0, "ms": 1e-3, "ns": 1e-9}
+AIM = re.compile(r"([≤≥]) \+?([\d .]*\d) ?([^\s\d]*)")
+MEASURED = re.compile(r"(\.?\d[\d.]*)(?: against [\d.]+)? ?([^\s\d]*)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +23,20 @@ class Row:
     aim: str = ""
     rounds: tuple[float, ...] = ()
     unit: str = ""
+
+    @property
+    def is_met(self) -> bool:
+        """Whether the first measured number in the unit of the aim meets it; True without an aim."""
+        aim = AIM.match(self.aim)
+        if aim is None:
+            return True
+        limit, unit = float(aim[2].replace(" ", "")), aim[3]
+        scale = SECONDS.get(unit, 1.0)
+        for number, other in MEASURED.findall(self.measured.replace("*", "")):
+            if unit == "" or other == unit or {unit, other} <= SECONDS.keys():
+                value = float(number) * (SECONDS[other] if other in SECONDS and unit in SECONDS else 1.0)
+                return value <= limit * scale if aim[1] == "≤" else value >= limit * scale
+        return True
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +97,10 @@ def duration_ratios(ours: list[float], theirs: list[float]) -> tuple[float, ...]
 
 def format_table(title: str, rows: list[Row]) -> str:
     lines = [f"### {title}", "", "| what | measured | aim |", "|---|---|---|"]
-    return "\n".join([*lines, *(f"| {row.label} | {row.measured} | {row.aim} |" for row in rows), ""])
+    aims = (row.aim if row.is_met else f"{row.aim} (not met)" for row in rows)
+    return "\n".join(
+        [*lines, *(f"| {r.label} | {r.measured} | {aim} |" for r, aim in zip(rows, aims, strict=True)), ""]
+    )
 
 
 def processor_name() -> str:

@@ -8,8 +8,8 @@ from rich.console import Console
 from rodsight.solver.assessment.trust import motion_assessment
 from rodsight.solver.frame_forces import FrameStatus
 from rodsight.study.report.status import refit_status
-from rodsight.study.report.status_sample import WINDOW, StatusSample, observe_status
-from rodsight.study.truths import simulate
+from rodsight.study.report.status_sample import StatusSample, observe_status
+from rodsight.study.truths import WINDOW, simulate
 
 GRAINS, SEEDS = 250, (31, 32)
 NOISES = (0.0, 1e-5, 4e-5)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -52,7 +51,7 @@ def campaign(
 
     processes = worker_count(workers)
     console = table_console(quiet=quiet or as_json)
-    cases = [replace(case, record=recordings) for case in read_plan(table)]
+    cases = read_plan(table, record=recordings)
     if dry:
         if as_json:
             print(json.dumps([case.as_plain() for case in cases], indent=1))

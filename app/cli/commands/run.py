@@ -6,9 +6,6 @@ import json
 import math
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -31,38 +28,14 @@ from ..arguments import (
     Settings,
     Sweeps,
     Threads,
-    parse_frames,
     refuse_unused,
     worker_count,
 )
-from ..terminal import Form, print_line, progress_of
+from ..run_request import Request, byte_count, open_run
+from ..terminal import print_line, progress_of
 
 if TYPE_CHECKING:
     from ...run_folder import Run
-
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """The arguments that commands on an experiment share, as given by the user."""
-
-    experiment: Path
-    settings: tuple[str, ...] = ()
-    quiet: bool = False
-    out: Path | None = None
-    frames: str | None = None
-    max_size: float | None = None  # [MB] of the recording
-    full_frames: tuple[int, ...] = ()
-    progress: Form = "bars"
-    keep_old: bool = False
-    print_table: bool = True  # False: standard output is kept for JSON
-
-    @property
-    def console(self) -> Console:
-        return Console(quiet=self.quiet or not self.print_table)
-
-    def with_setting(self, key: str, value: str | int | None) -> Request:
-        """Return the request with one more setting, if a value is given."""
-        return self if value is None else replace(self, settings=(*self.settings, f"{key}={json.dumps(value)}"))
 
 
 def run(
@@ -308,33 +281,11 @@ def _record_alone(request: Request, sweeps: str | None) -> int:
     with progress_of(request.quiet) as progress, hold_folder(target.parent, notes.append):
         written = write_recording(
             results, target, progress=lambda done, total: progress("recording", done, total),
-            options=RecordingOptions(sweeps or "log", _bytes(request.max_size)),
+            options=RecordingOptions(sweeps or "log", byte_count(request.max_size)),
         )  # fmt: skip
     for note in (*notes, *written.notes):
         print_line(request.console, note)
     return show(target, "none", request.console)
-
-
-@contextmanager
-def open_run(request: Request, *, writes: bool = True) -> Iterator[Run]:
-    """Open the requested run with a progress display; a run that writes locks its folder."""
-    from ...experiment.config.unused_keys import refuse_unused_keys
-    from ...experiment.experiment import load_experiment
-    from ...run_folder import Run, hold_run
-
-    experiment = load_experiment(request.experiment, request.settings)
-    refuse_unused_keys(experiment.config, experiment.file)
-    folder = request.out if request.out is not None else Path("runs") / experiment.name
-    with progress_of(request.quiet, request.progress) as progress:
-        run = Run(
-            experiment, folder, parse_frames(request.frames), progress, max_size=_bytes(request.max_size),
-            full_frames=request.full_frames, keep_old=request.keep_old,
-        )  # fmt: skip
-        if not writes:
-            yield run
-            return
-        with hold_run(run):
-            yield run
 
 
 def _follow(request: Request, idle: float | None) -> None:
@@ -357,14 +308,6 @@ def _follow(request: Request, idle: float | None) -> None:
             run, request.settings, idle=idle, alarm=alarm, report=lambda text: print_line(request.console, text)
         ):
             pass
-
-
-def _bytes(megabytes: float | None) -> int | None:
-    if megabytes is None:
-        return None
-    if not (math.isfinite(megabytes) and megabytes > 0.0):
-        raise InputError("--max-size", str(megabytes), "is not a positive number of megabytes")
-    return int(1e6 * megabytes)
 
 
 def _print_notes(run: Run, console: Console) -> None:

@@ -19,8 +19,8 @@ from ..arguments import (
     refuse_unused,
     worker_count,
 )
+from ..run_request import Request, open_run
 from ..terminal import table_console
-from .run import Request, open_run
 
 
 def sensitivity(

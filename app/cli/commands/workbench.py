@@ -60,14 +60,16 @@ def init(
     ] = None,
     channel: Annotated[
         Literal["grey", "red", "green", "blue"] | None,
-        tyro.conf.arg(help="of the photographs in which rods stand out best; default grey"),
+        tyro.conf.arg(help="of the photographs; default: the one in which the rods stand out best, by trial"),
     ] = None,
     region: Annotated[
         str | None, tyro.conf.arg(metavar="X0,Y0,X1,Y1", help="columns and rows [px] outside of which nothing is seen")
     ] = None,
     follow: Annotated[
         Literal["texture", "outline"] | None,
-        tyro.conf.arg(help="by the texture of the rods, or by their outline where they are plain; default texture"),
+        tyro.conf.arg(
+            help="by the texture of the rods, or by their outline where they are plain; default: by trying both"
+        ),
     ] = None,
     radius_range: Annotated[
         str | None, tyro.conf.arg(metavar="A:B", help="of the radii to look for [px], where --radii are unknown")

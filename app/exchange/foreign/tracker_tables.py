@@ -57,16 +57,15 @@ def read_by_columns(file: Path, columns: Mapping[str, str], *, degrees: bool) ->
     return observe_table(table, columns, degrees=degrees)
 
 
-def observe_table(
-    table: Table, columns: Mapping[str, str], *, degrees: bool = False, remarks: tuple[str, ...] = ()
-) -> Observations:
+def observe_table(table: Table, columns: Mapping[str, str], *, degrees: bool = False) -> Observations:
     """Make observations of a table; rows without an id are left out and counted."""
     name = table.text(columns["id"])
     kept = np.array([each != "" for each in name])
     if not kept.any():
         raise InputError(table.file, f"column {columns['id']}", "is empty: no row belongs to a grain")
+    remarks: tuple[str, ...] = ()
     if unnamed := int((~kept).sum()):
-        remarks = (*remarks, f"Left out: {state_count(unnamed, 'row')} without a grain ({columns['id']} is empty).")
+        remarks = (f"Left out: {state_count(unnamed, 'row')} without a grain ({columns['id']} is empty).",)
         table = table.select(kept)
     angle = table.optional_numbers(columns.get("theta", ""))
     radius = table.optional_numbers(columns.get("radius", ""))

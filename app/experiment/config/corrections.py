@@ -8,6 +8,8 @@ from collections.abc import Callable
 from difflib import get_close_matches
 from typing import Any
 
+from .keys import MIN_SIMILARITY
+
 # Factors to the units of the keys; spellings without superscripts are compared (kg/m3 for kg/m³).
 _LENGTH = {"km": 1e3, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "um": 1e-6, "nm": 1e-9}
 _PRESSURE = {
@@ -25,7 +27,6 @@ _ASSIGNMENT = re.compile(r"\s*([\w.-]+)\s*[:=]*=[=\s]*([^#]*?)\s*(?:#.*)?")
 SOLID_DENSITIES = (10.0, 2.3e4)  # [kg/m³] the lightest foams for packaging; osmium has 22 590
 GREATEST_RADIUS = 0.5  # [m] of a rod
 DENSITIES_IN_OTHER_UNITS = (1e3, 1e-3)  # g/cm³ and g/m³, as factors to kg/m³
-MIN_SIMILARITY = 0.7  # of a word that the user may have meant
 DIGITS = 12  # of a converted number
 
 

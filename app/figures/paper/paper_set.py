@@ -21,12 +21,12 @@ from ...solver.frame_forces import FrameStatus
 from ...solver.statistics.force_statistics import FORCE_EDGES, force_density
 from ..figure_style import BLUE, INK, OUTLINE, VERMILION, Width, add_scale_bar, add_title, new_figure
 from ..force_network import bar_length, bounds_of, draw_network
+from ..time_curves import DEGREE
 from .recorded_stress import recorded_stress
 
 STRIP = 5  # consecutive networks
 SCALE_BAR = 0.07  # of the width, below the packing
 INSET_RADII = 2.2  # half width of the inset, in radii of the shown rod
-DEGREE = 180.0 / np.pi
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,7 +69,7 @@ def calibrate_tracks(
         radius_class=radius_classes(tracks.radius),
     )  # fmt: skip
     if not found.applied:
-        # A far understated noise makes detection miss contacts, whatever the errors of the centres.
+        # A noise stated far too small makes detection miss contacts, whatever the errors of the centres.
         factor = found.noise_factor if found.noise_factor > EXCESSIVE_NOISE else 1.0
         return replace(tracks, sigma=held_once(factor * tracks.sigma)), walls, found
     better = found.correct(measured)

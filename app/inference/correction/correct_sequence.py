@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ...process.errors import UndeterminedError
 from ...solver.bodies.interpolation import interpolate_ignored_frames
+from ...solver.bodies.motion import Snapshot
 from ...solver.bodies.packing import Packing
+from ...solver.bodies.rods import RodMaterial
 from ...solver.contacts.radius_tuning import RadiusTuning
+from ...solver.convex.friction_check import WallFriction
+from ...solver.detection.touch_probability import ContactProbabilitySettings
 from ...solver.sequence.failure import find_unseen
 from ...tracks import Tracks, WallTracks
 from ..corrected_sequence import CorrectedSequence
-from ..inputs import Inputs
+from ..inputs import InferenceSettings, Inputs
 from ..snapshots import make_snapshots
 from .boundary import correct_camera, correct_walls, measure_noise
 from .calibration import calibrate_tracks, known_radii, own_gap_error, radius_classes
@@ -25,6 +30,9 @@ from .short_gaps import interpolate_short_gaps
 from .soft_grain_errors import correct_soft_grains
 from .softness import assume_softness, find_softness
 from .unseen import add_unseen
+
+# Corrections that the first frame reports, in this order.
+REMARKS = ("outliers", "gaps", "camera", "noise", "span", "size_classes", "softness", "resistance", "sizes", "ids")
 
 
 class CoordinationError(UndeterminedError):
@@ -63,18 +71,21 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         settings = replace(settings, boundary=None, calibration=None, coordination=None)
     overlap, as_given, hidden = settings.overlap_of(tracks.radius), settings.calibration is None, False
     calibration = tuning = boundary = lens = None
-    remarks, material = [outlier_remark, gap_remark, "", "", "", "", "", "", size_remark, id_remark], inputs.material
+    material = inputs.material
+    remarks = dict.fromkeys(REMARKS, "") | {
+        "outliers": outlier_remark, "gaps": gap_remark, "sizes": size_remark, "ids": id_remark,
+    }  # fmt: skip
     if settings.calibration is not None:
         if settings.sequence.uses_positions:
-            material, remarks[6] = assume_softness(material, tracks, walls, failed)
-        tracks, remarks[5] = use_size_classes(material, tracks)
+            material, remarks["softness"] = assume_softness(material, tracks, walls, failed)
+        tracks, remarks["size_classes"] = use_size_classes(material, tracks)
     if settings.boundary is not None:
         if settings.boundary.camera:
-            tracks, walls, remarks[2], lens = correct_camera(
+            tracks, walls, remarks["camera"], lens = correct_camera(
                 material, tracks, walls, failed, radii_known=settings.radii_are_known
             )
         if settings.sequence.measure_precision:
-            tracks, remarks[3] = measure_noise(tracks, walls)
+            tracks, remarks["noise"] = measure_noise(tracks, walls)
         tracks, walls, boundary = correct_walls(settings.boundary, tracks, walls)
     if settings.calibration is not None:
         sequence, hidden = find_softness(material, settings.sequence, tracks, walls, failed)
@@ -90,7 +101,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
             corrected_gap = own_gap_error(calibration, radius_classes(given.radius))
             settings = replace(settings, sequence=replace(settings.sequence, corrected_gap=corrected_gap))
     if not nothing_seen:  # calibration has measured the noise that hides the sliding
-        span, remarks[4] = choose_span(tracks)
+        span, remarks["span"] = choose_span(tracks)
         alike = span if settings.sequence.soft else max(span, count_alike(tracks))
         settings = replace(settings, sequence=replace(settings.sequence, span=span, alike=alike))
     if settings.infer_unseen:
@@ -98,45 +109,72 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         sequence = replace(settings.sequence, unseen_sought=tracks.inferred is not None)
         settings = replace(settings, sequence=sequence)
         calibration = None if calibration is None else calibration.of_grains(tracks.grain_count)
-    inferred = 0 if tracks.inferred is None else int(tracks.inferred.sum())
-    packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
+    packing = _pack(material, tracks, walls)
     if settings.coordination is not None:
         tuning = tuned_radii(packing, tracks, walls, settings.coordination, failed)
         if not tuning.met:
             raise CoordinationError(tuning)
         tracks = replace(tracks, radius=tracks.radius + tuning.found)
-        packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
+        packing = _pack(material, tracks, walls)
     snapshots, of_walls = make_snapshots(tracks, walls), None
     seen = snapshots if nothing_seen else interpolate_ignored_frames(snapshots, failed)
-    probability = settings.for_overlap(overlap).for_radii(tracks.radius).ensemble.probability
-
-    def pack() -> Packing:
-        return material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
-
-    if settings.resistance and not (nothing_seen or settings.sequence.soft):
-        stated = material.wall_friction
-        material, remarks[7] = use_unstated(material, packing, seen, probability, settings.sequence.workers)
-        packing = pack()
-        if material.wall_friction != stated:
-            of_walls = refine_wall_friction(material, packing, seen, probability, settings.sequence.workers)
-    if (material.friction_measured or material.base_friction_measured) and not nothing_seen:
-        given_at_walls = material.wall_friction is not None
-        workers = settings.sequence.workers
-        material = measure_resisting(material, packing, seen, probability, workers)
-        if material.friction_measured:
-            material = measure_friction(material, pack(), seen, probability, workers)
-            if not given_at_walls:
-                of_walls = refine_wall_friction(material, pack(), seen, probability, workers)
-            if of_walls is not None:
-                material = replace(material, wall_friction=of_walls.measured)
-        packing = pack()
+    if not nothing_seen:
+        probability = settings.for_overlap(overlap).for_radii(tracks.radius).ensemble.probability
+        material, of_walls, remarks["resistance"] = _measure_friction(
+            settings, material, tracks, walls, seen, probability
+        )
+        packing = _pack(material, tracks, walls)
     corrected = CorrectedSequence(
         packing, tracks, walls, seen,
-        settings.for_overlap(overlap), inputs.verdicts, calibration, tuning, boundary, failed, of_walls,
-        inputs.material.friction_measured, inputs.material.base_gravity, "; ".join(each for each in remarks if each),
-        lens, bool(outlier_remark), hidden,
+        settings.for_overlap(overlap), inputs.verdicts, calibration, tuning, boundary, failed,
+        inputs.material.base_gravity, of_walls, inputs.material.friction_measured,
+        "; ".join(filter(None, remarks.values())), lens, bool(outlier_remark), hidden,
     )  # fmt: skip
     return corrected if as_given or nothing_seen or tuning is not None else correct_soft_grains(corrected)
+
+
+def _pack(material: RodMaterial, tracks: Tracks, walls: WallTracks) -> Packing:
+    inferred = 0 if tracks.inferred is None else int(tracks.inferred.sum())
+    return material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
+
+
+def _measure_friction(
+    settings: InferenceSettings,
+    material: RodMaterial,
+    tracks: Tracks,
+    walls: WallTracks,
+    seen: Sequence[Snapshot],
+    probability: ContactProbabilitySettings,
+) -> tuple[RodMaterial, WallFriction | None, str]:
+    """Measure the friction that is requested, and use one that is not stated but that the sliding shows.
+
+    Returns
+    -------
+    RodMaterial
+        With the coefficients to use.
+    WallFriction or None
+        Measured at walls; None: given, or as between rods.
+    str
+        What is used although it is not stated; empty: nothing.
+    """
+    of_walls, remark, workers = None, "", settings.sequence.workers
+    if settings.resistance and not settings.sequence.soft:
+        stated = material.wall_friction
+        material, remark = use_unstated(material, _pack(material, tracks, walls), seen, probability, workers)
+        if material.wall_friction != stated:
+            packing = _pack(material, tracks, walls)
+            of_walls = refine_wall_friction(material, packing, seen, probability, workers)
+    if material.friction_measured or material.base_friction_measured:
+        given_at_walls = material.wall_friction is not None
+        material = measure_resisting(material, _pack(material, tracks, walls), seen, probability, workers)
+        if material.friction_measured:
+            material = measure_friction(material, _pack(material, tracks, walls), seen, probability, workers)
+            if not given_at_walls:
+                packing = _pack(material, tracks, walls)
+                of_walls = refine_wall_friction(material, packing, seen, probability, workers)
+            if of_walls is not None:
+                material = replace(material, wall_friction=of_walls.measured)
+    return material, of_walls, remark
 
 
 def complete_walls(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, dict[int, str]]:

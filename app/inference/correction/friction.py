@@ -14,8 +14,8 @@ from ...solver.bodies.rods import RodMaterial
 from ...solver.contacts.radius_tuning import RadiusTuning, tune_radii
 from ...solver.convex.friction_check import (
     BIAS,
+    CHECKED_FRAMES,
     COVERAGE_FACTOR,
-    FRAMES,
     LEAST_SLIDING,
     MIN_WALL_CONTACTS,
     QUIET,
@@ -26,9 +26,7 @@ from ...solver.convex.friction_check import (
     measure_wall_friction,
 )
 from ...solver.convex.resistance import (
-    FRAMES as RESISTED,
-)
-from ...solver.convex.resistance import (
+    COMPARED_FRAMES,
     LEAST_WALLS,
     Resistance,
     base_drag_of,
@@ -71,7 +69,7 @@ def check_sequence_friction(sequence: CorrectedSequence, frames: Sequence[FrameF
     calm = np.array([status in (FrameStatus.SETTLED, FrameStatus.SETTLING) for status, _ in found])
     lost = np.array([1.0 - snapshot.present.mean() for snapshot in snapshots])
     contacts = max(int(np.median([count for _, count in found])), 1)
-    wanted = int(np.clip(-(-ENOUGH_CONTACTS // contacts), FEWEST_FRAMES, FRAMES))
+    wanted = int(np.clip(-(-ENOUGH_CONTACTS // contacts), FEWEST_FRAMES, CHECKED_FRAMES))
     count = min(wanted, len(snapshots) - 2)
     starts = np.arange(1, len(snapshots) - count)
     quiet = calm & (lost <= TOLERATED_LOSS)
@@ -115,14 +113,13 @@ def measure_friction(
     FrictionError
         The motion does not determine it.
     """
-    count = min(FRAMES, len(snapshots) - 2)
-    if count < 1:
+    frames = _middle_frames(snapshots, CHECKED_FRAMES)
+    if not frames:
         raise FrictionError("three photographs are needed to measure it")
-    first = max(1, (len(snapshots) - count) // 2)
     unit = force_scale(packing, ChainSettings())
     for _ in range(GUESSES):
         guess = replace(packing, material=material.friction_law())
-        found = check_friction(guess, snapshots, first, first + count - 1, unit, settings, workers)
+        found = check_friction(guess, snapshots, frames[0], frames[-1], unit, settings, workers)
         if not np.isfinite(found.measured):
             raise FrictionError("nothing slides in these photographs, so they do not determine it: give a number")
         change = abs(found.measured / material.friction - 1.0)
@@ -141,12 +138,11 @@ def measure_friction_of_walls(
     workers: int | None = 1,
 ) -> WallFriction | None:
     """Measure the friction at walls from the motion; None where it is given, or not shown."""
-    count = min(FRAMES, len(snapshots) - 2)
-    if material.wall_friction is not None or count < FEWEST_FRAMES:
+    frames = _middle_frames(snapshots, CHECKED_FRAMES)
+    if material.wall_friction is not None or len(frames) < FEWEST_FRAMES:
         return None
-    first = max(1, (len(snapshots) - count) // 2)
     unit = force_scale(packing, ChainSettings())
-    return measure_wall_friction(packing, snapshots, first, first + count - 1, unit, settings, workers)
+    return measure_wall_friction(packing, snapshots, frames[0], frames[-1], unit, settings, workers)
 
 
 def refine_wall_friction(
@@ -182,12 +178,12 @@ def measure_resisting(
     FrictionError, BaseFrictionError
         The motion does not determine it.
     """
-    count = min(FRAMES, len(snapshots) - 2)
+    numbers = _middle_frames(snapshots, CHECKED_FRAMES)
     error = BaseFrictionError if material.base_friction_measured else FrictionError
-    if count < 1:
+    if not numbers:
         raise error("three photographs are needed to measure it")
-    first, unit = max(1, (len(snapshots) - count) // 2), force_scale(packing, ChainSettings())
-    frames = resisted_frames(packing, snapshots, range(first, first + count), unit, settings, workers)
+    unit = force_scale(packing, ChainSettings())
+    frames = resisted_frames(packing, snapshots, numbers, unit, settings, workers)
     free: list[Parameter] = ["base_drag"] if material.base_friction_measured else []
     walls = float(np.mean([each.contacts.with_wall.sum() for each in frames]))
     if material.friction_measured:
@@ -223,8 +219,13 @@ def use_unstated(
     str
         What is used; empty: nothing.
     """
-    numbers = range(max(1, (len(snapshots) - RESISTED) // 2), len(snapshots) - 1)[:RESISTED]
-    if len(numbers) < RESISTED or material.friction <= 0.0 or material.at_walls() <= 0.0 or material.friction_measured:
+    numbers = _middle_frames(snapshots, COMPARED_FRAMES)
+    if (
+        len(numbers) < COMPARED_FRAMES
+        or material.friction <= 0.0
+        or material.at_walls() <= 0.0
+        or material.friction_measured
+    ):
         return material, ""
     unit = force_scale(packing, ChainSettings())
     frames = resisted_frames(packing, snapshots, numbers, unit, settings, workers)
@@ -245,7 +246,14 @@ def use_unstated(
         coefficient = base_drag_of(packing, found, unit) / material.base_gravity
         remarks.append(f"the base drags the rods as with a friction of {coefficient:.2g}")
         material = replace(material, base_friction=coefficient)
-    return material, "".join(f"{each}: this is used, unless calibration.resistance is false; " for each in remarks)[:-2]
+    return material, "; ".join(f"{each}: this is used, unless calibration.resistance is false" for each in remarks)
+
+
+def _middle_frames(snapshots: Sequence[Snapshot], most: int) -> range:
+    """Return the middle frames with a photograph before and after each, at most so many; empty: there are none."""
+    count = min(most, len(snapshots) - 2)
+    first = max(1, (len(snapshots) - count) // 2)
+    return range(first, first + count)
 
 
 class BaseFrictionError(UndeterminedError):

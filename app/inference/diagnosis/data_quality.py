@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...solver.assessment.motion_information import DETECTABLE
 from ...solver.bodies.grains import Grains
 from ...solver.bodies.motion import Snapshot
 from ...solver.bodies.rods import RodMaterial
@@ -19,6 +20,7 @@ from ...solver.detection.displacement import displacement_scale
 from ...solver.detection.precision import contradiction, measure_precision
 from ...solver.detection.refinement import refine
 from ...solver.detection.touch_probability import ContactProbabilitySettings
+from ...solver.part_settings import REFERENCE_STEP, SLIP_SIGMAS
 from ...solver.posterior.sequence_evidence import gather_position_evidence
 from ...tracks import Tracks, WallTracks
 from ..snapshots import grains_of, make_snapshots
@@ -26,7 +28,6 @@ from ..snapshots import grains_of, make_snapshots
 EXAMINED_PHOTOGRAPHS = 3
 UNCLEAR_GAPS = 0.009  # standard deviation of the gaps of touching grains over a diameter that hides the contacts
 VISIBLE_OFFSET = 0.015  # mean gap of touching grains over the mean diameter, above which it is reported
-REFERENCE_STEP = math.radians(0.25)
 HIDING_NOISE = 0.5  # noise over motion above which the motion has almost no information
 SUFFICIENT_NOISE = 0.25  # the same below which it has enough
 NO_SLIDING = 0.02  # fraction of sliding contacts below which the motion does not determine forces
@@ -34,11 +35,9 @@ NO_SLIDING = 0.02  # fraction of sliding contacts below which the motion does no
 # rest worse than forces of either sign. Sheared packings slide at .2 and more; under a rising pressure, or nearly
 # jammed, at less than .06, and there causes were named wrongly.
 FEW_SLIDING = 0.1
-COARSE_STEPS = 2.0  # reference steps beyond which forces cannot be followed
+COARSE_STEPS = 2.0  # of REFERENCE_STEP, beyond which closer photographs are advised
 AMBIGUOUS = (0.05, 0.95)  # P(touch) between which a pair is ambiguous
 TOUCHING = 0.5  # P(touch)
-DETECTABLE = 3.0  # standard deviations of a measured sliding beyond which it is detected
-SLIDING_SIGMAS = 2.8  # sd of a sliding over that of a position: two grains, translation and rotation, two photographs
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +161,7 @@ def _sliding(contacts: Contacts, grains: Grains, snapshots: list[Snapshot], nois
         after.rotation - before.rotation, walls,
     )  # fmt: skip
     known = np.isfinite(slid)
-    return float((np.abs(slid[known]) > DETECTABLE * SLIDING_SIGMAS * noise).mean()) if known.any() else math.nan
+    return float((np.abs(slid[known]) > DETECTABLE * SLIP_SIGMAS * noise).mean()) if known.any() else math.nan
 
 
 def _measure_gaps(tracks: Tracks, walls: WallTracks, snapshots: list[Snapshot], noise: float) -> tuple[float, float]:

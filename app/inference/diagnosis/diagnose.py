@@ -2,7 +2,7 @@
 
 Tests without forces come first, then the comparison of what resists the sliding, then rivals of the geometry, each
 solved for a few photographs as a run would. The one whose evidence leads to expect clearly better forces
-than the given input, and than all other causes, is named. Nothing is named that does not win.
+than the given input, and than all other causes, is named. Nothing is named that is not clearly better.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...process.counts import mean_of_known
 from ...process.errors import UndeterminedError
 from ...process.machine.linear_algebra import one_thread_each
 from ...process.progress import Progress, no_progress
 from ...results.finding import Finding
 from ...results.results import Results
 from ...solver.assessment.intervals.wall_sensors import contradicting
-from ...solver.bodies.grains import Array
 from ...solver.convex.friction_check import QUIET
 from ..correction.correct_sequence import complete_walls, correct_sequence
 from ..correction.outliers import restore_exchanged_ids
@@ -48,8 +48,8 @@ from .wall_times import examine_wall_times
 # Rise of arctanh r that a rival must reach over the given input, and over all other causes. On correct input, and where
 # the model lacks physics that no rival has, the highest rise was 0.13 (seed 40, six scenarios).
 CLEAR, AHEAD = 0.2, 0.1
-DOUBTFUL = 0.93  # expected r of some photographs of a solved test below which rivals are compared
-UNEXPLAINED = 0.85  # expected r below which something is wrong although no cause wins
+COMPARED = 0.93  # expected r of some photographs of a solved test below which rivals are compared
+UNEXPLAINED = 0.85  # expected r below which something is wrong although no cause is named
 FEW_OUTLIERS = 0.003  # fraction of the poses that jump, below which they do not explain poor forces
 GAP_SHOWN = 0.5  # of the mean gap that wrong radii of all hard rods cause: with less they are not wrong
 LEAST_GRAINS = (
@@ -106,7 +106,7 @@ def diagnose(
     if not found and sliding and inputs.tracks.grain_count >= LEAST_GRAINS:
         found = _examine_sliding(inputs, first) or (_examine_sliding(inputs, 0) if first else [])
     if not (found or trial is None or inputs.tracks.grain_count < LEAST_GRAINS):
-        # Gaps between hard rods show a stretching by themselves. Where they show none, one that wins moves the walls.
+        # Gaps between hard rods show a stretching by themselves. Where they show none, such a rival moves the walls.
         shown = undisturbed or sought
         excluded = ("stretched_picture",) if shown and not (camera or trial.soft) else ()
         found = _compare_rivals(inputs, trial, progress, first, excluded)
@@ -120,7 +120,7 @@ def diagnose(
 def _compare_rivals(
     inputs: Inputs, trial: Trial, progress: Progress, first: int, excluded: Collection[str]
 ) -> list[Finding]:
-    """Solve the rivals of the geometry, and name the one that clearly wins unless its cause is excluded."""
+    """Solve the rivals of the geometry, and name the clearly best one unless its cause is excluded."""
     offset = math.nan if trial.soft else _mean_gap(inputs)
     rivals = [each for each in rivals_of(inputs) if not each.gap * offset < GAP_SHOWN * each.gap**2]
     rise: dict[str, tuple[float, str]] = {}
@@ -129,7 +129,7 @@ def _compare_rivals(
         score = trial_score(rival.change(inputs), first)
         rise[rival.cause] = max(rise.get(rival.cause, (float("-inf"), "")), (score - trial.score, rival.words))
     progress("diagnosing", len(rivals), len(rivals))
-    best = _winner(rise)
+    best = _clearest_cause(rise)
     if best and best not in excluded:
         gain, words = rise[best]
         evidence = f"if {words}, what the forces leave unexplained falls to {_remainder(gain)}"
@@ -158,7 +158,7 @@ def diagnose_solved(
     Returns
     -------
     list of Finding
-        Rivals are compared only where some photographs have an expected r below DOUBTFUL. The first one, to which no
+        Rivals are compared only where some photographs have an expected r below COMPARED. The first one, to which no
         motion leads, and which no trial judges, is no reason.
     """
     check = results.friction_check
@@ -166,8 +166,8 @@ def diagnose_solved(
     expected = np.array([frame.expected_correlation for frame in results.frames])
     window = min(TRIAL_PHOTOGRAPHS, len(expected))
     expected[0] = np.nan
-    mean = np.array([_mean(expected[k : k + window]) for k in range(len(expected) - window + 1)])
-    if np.isfinite(mean).any() and np.nanmin(mean) < DOUBTFUL:
+    mean = np.array([mean_of_known(expected[k : k + window]) for k in range(len(expected) - window + 1)])
+    if np.isfinite(mean).any() and np.nanmin(mean) < COMPARED:
         first = int(np.nanargmin(mean))
         trial = solve_trial(inputs, first=first)
         return diagnose(inputs, trial, progress, first=first, undisturbed=undisturbed)
@@ -202,12 +202,7 @@ def _mean_gap(inputs: Inputs) -> float:
     return math.nan if quality is None else quality.gap_offset / quality.diameter
 
 
-def _mean(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else float("nan")
-
-
-def _winner(rise: dict[str, tuple[float, str]]) -> str:
+def _clearest_cause(rise: dict[str, tuple[float, str]]) -> str:
     order: Sequence[str] = sorted(rise, key=lambda cause: rise[cause][0], reverse=True)
     if not order or rise[order[0]][0] < CLEAR:
         return ""

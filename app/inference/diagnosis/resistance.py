@@ -8,7 +8,7 @@ import numpy as np
 
 from ...results.finding import Finding
 from ...solver.convex.friction_check import BIAS
-from ...solver.convex.resistance import FRAMES, Resistance, base_drag_of, find_in_sequence
+from ...solver.convex.resistance import COMPARED_FRAMES, Resistance, base_drag_of, find_in_sequence
 from ...solver.nlgs.chain import ChainSettings, force_scale
 from ..corrected_sequence import CorrectedSequence
 from .causes import finding
@@ -30,7 +30,7 @@ def examine_resistance(sequence: CorrectedSequence, *, used: bool = False) -> li
     """
     packing, snapshots = sequence.packing, sequence.snapshots
     probability = sequence.settings.for_radii(packing.grains.radius).ensemble.probability
-    first = max(1, (len(snapshots) - FRAMES) // 2)
+    first = max(1, (len(snapshots) - COMPARED_FRAMES) // 2)
     unit = force_scale(packing, ChainSettings())
     found = find_in_sequence(packing, snapshots, first, unit, probability, sequence.settings.workers)
     if found is None or not found.cause or (found.cause == "friction" and sequence.friction_measured):

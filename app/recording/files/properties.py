@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
+from ...process.counts import known_or_none, mean_of_known
 from ...solver.frame_forces import FrameStatus
 from ..look.printable_text import printable
 from ..look.scene import Scene
@@ -77,5 +78,4 @@ def _median(values: Sequence[float]) -> float | None:
 
 
 def _mean(values: Sequence[float]) -> float | None:
-    known = _known(values)
-    return float(np.mean(known)) if known else None
+    return known_or_none(mean_of_known(values))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 
@@ -254,14 +255,9 @@ def _number(value: float) -> str:
     return f"{value:.2f}" if np.isfinite(value) else "–"
 
 
-def _cell(text: str) -> str:
-    """Return a sentence as one cell of a Markdown table."""
-    return " ".join(text.replace("|", "/").split())
-
-
-def _median_and_worst_cells(values: list[float], worst: object) -> str:
+def _median_and_worst_cells(values: list[float], worst: Callable[[Array], float]) -> str:
     """Return median and worst of the finite values as two cells of a Markdown table."""
     known: Array = np.array([v for v in values if np.isfinite(v)])
-    if len(known) == 0 or not callable(worst):
+    if len(known) == 0:
         return "– | –"
     return f"{np.median(known):.3g} | {worst(known):.3g}"

@@ -30,7 +30,7 @@ CONTENT_POLICY = "; ".join(
         "require-trusted-types-for 'script'",
     )
 )  # fmt: skip
-_HEADERS = ("Host", "Origin", "Sec-Fetch-Site", "Content-Type", "Cookie")
+READ_HEADERS = ("Host", "Origin", "Sec-Fetch-Site", "Content-Type", "Cookie")
 SAFE_HEADERS = {
     "Content-Security-Policy": CONTENT_POLICY,
     "X-Content-Type-Options": "nosniff",
@@ -108,7 +108,7 @@ class Gate:
         for name in ("Host", "Origin"):
             if len(headers.get_all(name) or []) > 1:
                 return HTTPStatus.BAD_REQUEST, f"the header {name} is given twice"
-        known = {name: value for name in _HEADERS if (value := headers.get(name)) is not None}
+        known = {name: value for name in READ_HEADERS if (value := headers.get(name)) is not None}
         objection = self.objection(known, changes=changes, entering=entering)
         return None if objection is None else (HTTPStatus.FORBIDDEN, objection)
 

@@ -66,9 +66,9 @@ def write_single_page(recordings: Sequence[Path], target: Path | str, *, title: 
     return Path(target).stat().st_size
 
 
-def single_page(recordings: Sequence[Path], *, title: str, cards: Sequence[str] = ()) -> str:
+def single_page(recordings: Sequence[Path], *, title: str) -> str:
     """Return the text of such a page, with base64 data, which stay small in UTF-8 as well."""
-    return _page(recordings, title, cards, _as_base64)
+    return _page(recordings, title, (), _as_base64)
 
 
 def as_characters(data: bytes) -> str:

@@ -10,8 +10,9 @@ from rich.table import Table
 
 from ...inference.infer_sequence import infer_sequence
 from ...inference.inputs import Inputs
+from ...process.counts import mean_of_known
 from ...results.results import Results, TruthContacts
-from .real_forces import mean_of, study_real
+from .real_forces import study_real
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +43,10 @@ def measure_gain(seed: int, inputs: Inputs, results: Results, truth: TruthContac
     plain = infer_sequence(replace(inputs, tracks=replace(inputs.tracks, fringes=None)), diagnosis=())
     sides = [float("nan")] * len(results.frames)
     fringed, bare = (study_real(each, truth, sides).frames for each in (results, plain))
-    static, overlap = (_mean([getattr(row, source).r for row in fringed]) for source in ("static", "overlap"))
+    static, overlap = (mean_of_known([getattr(row, source).r for row in fringed]) for source in ("static", "overlap"))
     return FringeGain(
-        seed, _mean([row.ours.r for row in bare]), _mean([row.ours.r for row in fringed]),
-        _mean([row.ours.pressure for row in fringed]), max(static, overlap),
+        seed, mean_of_known([row.ours.r for row in bare]), mean_of_known([row.ours.r for row in fringed]),
+        mean_of_known([row.ours.pressure for row in fringed]), max(static, overlap),
         min(row.ours.r - row.trust for row in fringed),
     )  # fmt: skip
 
@@ -59,7 +60,8 @@ def print_gains(console: Console, found: Mapping[str, Sequence[FringeGain]]) -> 
     for preset, rows in found.items():
         named = [(f"{preset}, {row.seed}", row) for row in rows]
         without, fringed, pressure, balance = (
-            _mean([getattr(row, name) for row in rows]) for name in ("without", "with_fringes", "pressure", "balance")
+            mean_of_known([getattr(row, name) for row in rows])
+            for name in ("without", "with_fringes", "pressure", "balance")
         )
         mean = FringeGain(-1, without, fringed, pressure, balance, min(row.trust for row in rows))
         for name, row in [*named, (f"{preset}, mean", mean)]:
@@ -68,8 +70,3 @@ def print_gains(console: Console, found: Mapping[str, Sequence[FringeGain]]) -> 
                 f"{row.with_fringes - row.without:+.3f}", f"{row.pressure:.3f}", f"{row.trust:+.3f}",
             )  # fmt: skip
     console.print(table)
-
-
-def _mean(values: Sequence[float]) -> float:
-    found = mean_of(values)
-    return float("nan") if found is None else found

@@ -13,8 +13,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from ...exchange.foreign.pegs import COPY_DIGITS
 from ...experiment.reading.tables import read_table
 from ...inference.snapshots import make_snapshots
+from ...process.counts import mean_of_known
 from ...process.errors import InputError
 from ...process.frame_range import FrameRange
 from ...results.results import Results, TruthContacts
@@ -32,7 +34,6 @@ from ...solver.statistics.balance import sum_on_grains
 from ...solver.statistics.stress import love_weber_stress, principal_stresses
 from ..baselines import packing_of
 
-COPY_DIGITS = 1e-6  # relative difference of the copies of a reading: that of their rounding
 EXCESS = 0.03  # of the trust over r that is an error of the trust
 LEAST_FRAMES = 3  # for a correlation over time
 SOURCES = ("ours", "static", "overlap", "uniform", "ceiling")  # of force fields; the last one uses the truth
@@ -213,8 +214,7 @@ def as_json(study: RealStudy) -> dict[str, object]:
 
 def mean_of(values: Sequence[float]) -> float | None:
     """Return the mean of the finite values; None without any."""
-    known = [value for value in values if np.isfinite(value)]
-    return round(float(np.mean(known)), 6) if known else None
+    return _plain(mean_of_known(values))
 
 
 def _plain(value: float) -> float | None:

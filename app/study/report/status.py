@@ -23,15 +23,14 @@ from ...solver.assessment.intervals import formula_sd
 from ...solver.assessment.trust import motion_assessment
 from ...solver.bodies.grains import Array
 from ...solver.frame_forces import FrameStatus
-from ..truths import simulate
+from ..fitting.coverage import coverage_scale
+from ..truths import NOISES, simulate
 from .status_sample import FAULTS, StatusSample, observe_status
 
-NOISES = (0.0, 1e-5, 2e-5, 4e-5)  # [m]
 MAX_BELOW_TRUST = 0.06  # fraction of frames that may have r below their trust
 FAULT_WEIGHT = 0.5  # of a faulty frame in the fit of the trust: most real sequences have no fault
 CHANGED = 0.2  # 1 − correlation with the previous true forces, above which a packing has rearranged
 RESTARTS = 3  # of the fit, each from the last result with a new simplex
-COVERED = (0.683, 0.954)  # of one and of two standard deviations
 POWERS = (0.5, 4.0)  # of D and ε
 
 
@@ -121,7 +120,7 @@ def _fit_deviation(error: Array, force: Array, ensemble_sd: Array) -> tuple[floa
 
     x = _minimise(loss, np.log([0.05, 0.1, 1.0]))
     ratio = size / sd(x)
-    scale = math.sqrt(float(np.quantile(ratio, COVERED[0])) * float(np.quantile(ratio, COVERED[1])) / 2.0)
+    scale = coverage_scale(ratio)
     a, b, c = (float(each) for each in np.exp(x) * scale)
     return a, b, c
 

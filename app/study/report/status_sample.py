@@ -20,9 +20,8 @@ from ...solver.contacts.pairs import Keys, match_values
 from ...solver.dem.dem_truth import DemTruth
 from ...solver.frame_forces import FrameForces, FrameStatus
 from ...solver.statistics.agreement import compare_forces
-from ..truths import NEGLIGIBLE, agreement_of, observe, true_forces, truth_keys, window_starts
+from ..truths import NEGLIGIBLE, WINDOW, agreement_of, observe, true_forces, truth_keys, window_starts
 
-WINDOW = 12  # photographs of one sequence
 FAULTY_WINDOW = 6
 FAULT_NOISE = 1e-5  # [m]
 FAULTS = (

@@ -6,7 +6,6 @@ error bars are fitted on some packings and judged on others.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,11 +28,9 @@ from ...solver.bodies.grains import Array
 from ...solver.contacts.pairs import match_values
 from ...solver.dem.dem_truth import DemTruth
 from ...solver.parallel import available_cores
-from ..scenarios.interval_coverage import COVERED, coverage
-from ..truths import NEGLIGIBLE, observe, simulate, true_forces, window_starts
-
-WINDOW = 12  # photographs of one sequence
-NOISES = (1e-5, 2e-5, 4e-5)  # [m]
+from ..fitting.coverage import coverage_scale
+from ..scenarios.interval_coverage import coverage
+from ..truths import NEGLIGIBLE, NOISES, WINDOW, observe, simulate, true_forces, window_starts
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +96,7 @@ def measure_error_bars(
     progress: Progress = no_progress,
 ) -> ErrorBars:
     """Solve loading and unloading windows of all truths at every noise [m] with an ensemble."""
-    noises = NOISES if noises is None else noises
+    noises = NOISES[1:] if noises is None else noises
     jobs = [
         (t, start, noise) for t in range(len(truths)) for start in window_starts(truths[t], WINDOW) for noise in noises
     ]
@@ -129,7 +126,7 @@ def fit_sd_weights(sample: ErrorBars, component: int) -> tuple[float, float]:
 
     x = minimize(loss, np.log([0.5, 0.8]), method="Nelder-Mead").x
     ratio = size / np.hypot(np.exp(x[0]) * ensemble_sd, np.exp(x[1]) * formula_sd)
-    scale = math.sqrt(float(np.quantile(ratio, COVERED[0])) * float(np.quantile(ratio, COVERED[1])) / 2.0)
+    scale = coverage_scale(ratio)
     a, b = (float(each) for each in np.exp(x) * scale)
     return a, b
 

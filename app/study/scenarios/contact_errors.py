@@ -36,7 +36,7 @@ class ContactErrors:
     group: NDArray[np.uint8]  # (c,) of Group
     wall: NDArray[np.bool_]  # (c,)
     sliding: NDArray[np.bool_]  # (c,)
-    doubtful: NDArray[np.bool_]  # (c,)
+    ambiguous: NDArray[np.bool_]  # (c,)
     evidence_source: NDArray[np.uint8]  # (c,) of EvidenceSource
     terms: Array  # (c, t) of Term, before the friction check
     force: Array  # (c, 2)
@@ -90,7 +90,7 @@ def _of_frame(
         group=groups_of(frame)[bearing],
         wall=frame.contacts.with_wall[bearing],
         sliding=frame.sliding_probability[bearing] > SLIDES,
-        doubtful=frame.bearing_probability[bearing] < UNCERTAIN,
+        ambiguous=frame.bearing_probability[bearing] < UNCERTAIN,
         evidence_source=np.full(count, source_of_frame(frame), np.uint8),
         terms=np.tile(terms_of(before), (count, 1)),
         force=force[bearing] / mean,

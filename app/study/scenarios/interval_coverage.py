@@ -17,6 +17,7 @@ from ...solver.assessment.intervals.force_intervals import WEAK, EvidenceSource
 from ...solver.assessment.motion_information import STRONG
 from ...solver.bodies.grains import Array
 from ...synthetic.scenarios.preset_names import ScenarioName
+from ..fitting.coverage import COVERED
 from .contact_errors import ContactErrors
 
 FIT_SCENARIOS: tuple[ScenarioName, ...] = (
@@ -27,7 +28,6 @@ JUDGE_SCENARIOS: tuple[ScenarioName, ...] = (
     "step_1", "periodic", "radii_1", "centres", "unseen", "corners", "ten_frames", "mu_low", "mu_high",
     "stiff_noise_40", "stiff_moving", "friction_spread", "annulus",
 )  # fmt: skip
-COVERED = (0.683, 0.954)  # of one and of two standard deviations
 TOLERANCE = (0.05, 0.02)  # of these coverages
 COMPONENTS = ("f_n", "f_t")
 FIRST = "first frame"
@@ -39,7 +39,7 @@ GROUPS: dict[str, Callable[[ContactErrors], NDArray[np.bool_]]] = {
     "strong": lambda e: _later(e) & (e.force[:, 0] > STRONG),
     "sliding": lambda e: _later(e) & e.sliding,
     "wall": lambda e: _later(e) & e.wall,
-    "doubtful": lambda e: _later(e) & e.doubtful,
+    "ambiguous": lambda e: _later(e) & e.ambiguous,
     FIRST: lambda e: ~_later(e),
 }
 

@@ -19,9 +19,6 @@ from scipy.special import expit
 
 from ...process.progress import Progress, no_progress
 from ...solver.assessment.intervals.force_intervals import (
-    FACTOR,
-    POWER,
-    SLOPE,
     TYPICAL,
     EvidenceSource,
     Group,
@@ -30,8 +27,9 @@ from ...solver.assessment.intervals.force_intervals import (
 from ...solver.bodies.grains import Array
 from ...solver.dem.dem_truth import UnbalancedError
 from ...synthetic.scenarios.preset_names import ScenarioName
+from ..fitting.coverage import COVERED
 from .contact_errors import ContactErrors, measure_errors
-from .interval_coverage import COVERED, FIRSTS, FIT_SCENARIOS, GROUPS, TOLERANCE
+from .interval_coverage import FIRSTS, FIT_SCENARIOS, GROUPS, TOLERANCE
 from .scenario_score import StudyPlan
 from .solved_scenario import solve_one
 
@@ -59,10 +57,6 @@ class IntervalFit:
     factor: Array  # (evidence source, group, 2)
     slope: Array  # (evidence source, term, 2)
     power: Array  # (evidence source, 2)
-
-    @classmethod
-    def in_use(cls) -> IntervalFit:
-        return cls(FACTOR, SLOPE, POWER)
 
     def interval_sd(self, errors: ContactErrors) -> Array:
         """Return the standard deviations (c, 2) over the mean f_n by these constants."""

@@ -14,11 +14,11 @@ from rich.table import Table
 from scipy.stats import rankdata
 
 from ...experiment.experiment import load_experiment
-from ...inference.diagnosis.data_quality import REFERENCE_STEP
 from ...prediction import NO_EXPECTATION, Prediction, predict_accuracy
 from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
 from ...solver.dem.dem_truth import UnbalancedError
+from ...solver.part_settings import REFERENCE_STEP
 from ...solver.statistics.agreement import pearson
 from ...synthetic.scenarios.preset_names import ScenarioName
 from ...synthetic.scenarios.scenario_table import SCENARIOS

@@ -22,6 +22,7 @@ from ...inference.infer_sequence import infer_sequence
 from ...inference.inference_settings import material_of, settings_of
 from ...inference.inputs import Inputs
 from ...inference.solve_frames import InferenceObserver
+from ...process.counts import known_or_none, mean_of_known
 from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
 from ...results.results import Results
@@ -258,8 +259,7 @@ def _coverage(
 
 
 def _mean(values: Sequence[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return float(np.mean(known)) if known else None
+    return known_or_none(mean_of_known(values))
 
 
 def _plain(value: float) -> float | None:

@@ -42,14 +42,12 @@ class SolvedScenario:
         return with_ensemble_sd(self.frames, self.members, self.solution.sequence.settings.estimator)
 
 
-def solve_one(
-    plan: StudyPlan, scenario: ScenarioName, seed: int, progress: Progress = no_progress, *, members: int = 0
-) -> SolvedScenario:
+def solve_one(plan: StudyPlan, scenario: ScenarioName, seed: int, *, members: int = 0) -> SolvedScenario:
     """Make and solve a scenario; members: solutions with resampled input. Raises UnbalancedError."""
     with TemporaryDirectory() as folder:
-        made = make_planned(plan, Path(folder), scenario, seed, progress)
+        made = make_planned(plan, Path(folder), scenario, seed)
         experiment = load_experiment(made.folder, plan.settings)
-        solution = solve_scenario(experiment, progress)
+        solution = solve_scenario(experiment, no_progress)
         again = _solve_again(experiment, solution.sequence, members) if members else ()
         return SolvedScenario(scenario, seed, solution, true_forces(experiment, solution.sequence), again)
 

@@ -29,8 +29,9 @@ from ...solver.quantity import quantities
 from ...solver.statistics.frame_statistics import ContactProbabilities, FrameStatistics, frame_statistics
 from ...synthetic.scenarios.preset_names import ScenarioName
 from ...synthetic.scenarios.scenario_table import SCENARIOS as SCENARIO_TABLE
-from .interval_coverage import COVERED, JUDGE_SCENARIOS
+from ..fitting.coverage import coverage_scale
 from .interval_coverage import FIT_SCENARIOS as INTERVAL_SCENARIOS
+from .interval_coverage import JUDGE_SCENARIOS
 from .scenario_score import SETTLED
 from .solved_scenario import SolvedScenario
 
@@ -212,7 +213,7 @@ def _errors_of_fit(name: str, rows: Sequence[StatisticErrors], found: Sequence[S
 
 def _scale(ratio: Array) -> float:
     """Return the standard deviation that best covers 68 and 95 % of these (k,) within one and two of it."""
-    return float(np.sqrt(np.prod(np.quantile(ratio, COVERED) / (1.0, 2.0)))) if len(ratio) else float("nan")
+    return coverage_scale(ratio)
 
 
 def relative_bias(rows: Sequence[StatisticErrors]) -> float:

@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.table import Table
 from scipy.stats import spearmanr
 
+from ...process.counts import mean_of_known
 from ...solver.assessment.expected_correlation import BY_SLIDING, CLOSED, LEAST, MEASURES, seen_sliding
 from ...solver.assessment.intervals.scale_sd import FIRST_BY_SECOND, TABLE, TERMS
 from ...solver.assessment.intervals.scale_sd import LEAST as LEAST_SCALE_SD
@@ -142,7 +143,7 @@ class TrustSample:
         return replace(
             frames.select(first), r=r,
             measures={
-                name: np.array([_mean_known(each[some]) for some in of_row]) for name, each in frames.measures.items()
+                name: np.array([mean_of_known(each[some]) for some in of_row]) for name, each in frames.measures.items()
             },
         )  # fmt: skip
 
@@ -204,7 +205,10 @@ def fit_by_title(scores: Sequence[ScenarioScore]) -> dict[str, TrustFit]:
 
 
 def describe_fits(
-    fits: Mapping[str, TrustFit], scores: Sequence[ScenarioScore], still: Sequence[ScenarioScore], photographs: int
+    fits: Mapping[str, TrustFit],
+    scores: Sequence[ScenarioScore],
+    closed_scores: Sequence[ScenarioScore],
+    photographs: int,
 ) -> list[str]:
     """Describe all fits as tables of fitted.toml.
 
@@ -214,7 +218,7 @@ def describe_fits(
         By `fit_by_title`.
     scores : sequence of ScenarioScore
         That they were fitted to.
-    still : sequence of ScenarioScore
+    closed_scores : sequence of ScenarioScore
         Of CLOSED_KINDS; empty: fits without a known load only, under which there is no scale either.
     photographs : int
         The first ones of a test, by which r is predicted.
@@ -224,7 +228,8 @@ def describe_fits(
         *(fit.describe(title) for title, fit in fits.items()),
         *(describe_prediction(title, tests.select(tests.loaded == loaded)) for title, loaded in PREDICTIONS.items()),
     ]  # fmt: skip
-    return [*filter(None, tables), *([describe_scale_fit(scores), describe_closed_fit(still)] if still else [])]
+    scale = [describe_scale_fit(scores), describe_closed_fit(closed_scores)] if closed_scores else []
+    return [*filter(None, tables), *scale]
 
 
 def describe_prediction(title: str, tests: TrustSample) -> str:
@@ -334,11 +339,6 @@ def _fit_leaving_out(sample: TrustSample, names: Sequence[str]) -> tuple[Additiv
                 found = fit_additive(some.measures, some.strength, names, target[known], some.weight)
                 score[away] = found.score(others.measures, others.strength)
     return whole, score
-
-
-def _mean_known(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else math.nan
 
 
 def refit(sample: TrustSample, fits: dict[str, TrustFit]) -> TrustSample:

@@ -56,7 +56,6 @@ def make_fringed(
     preset: FringedPreset = "fringes",
     grains: int | None = None,
     frames: int | None = None,
-    cache: Path | None = None,
     progress: Progress = no_progress,
 ) -> FringedTest:
     """Write photographs of a photoelastic test as an experiment with its truth; the same arguments give the same bytes.
@@ -71,8 +70,6 @@ def make_fringed(
     grains : int, optional
     frames : int, optional
         Photographs; default: all of the simulation.
-    cache : Path, optional
-        Folder of simulated truths, read and added to.
     progress : Progress
 
     Raises
@@ -83,7 +80,7 @@ def make_fringed(
         If the simulation does not come to rest.
     """
     grains = check_output(out, grains)
-    truth = load_or_simulate(FRINGED_LOADINGS[preset], grains, seed, cache, progress)
+    truth = load_or_simulate(FRINGED_LOADINGS[preset], grains, seed, None, progress)
     if frames is not None:
         truth = truth.frames(0, min(frames, truth.frame_count))
     pixel = 2.0 * float(truth.radius.mean()) / DIAMETER

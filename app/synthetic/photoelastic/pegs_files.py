@@ -43,7 +43,7 @@ class MadePhotoelastic:
 
 
 def make_photoelastic(
-    out: Path, seed: int = 0, *, grains: int | None = None, cache: Path | None = None, progress: Progress = no_progress
+    out: Path, seed: int = 0, *, grains: int | None = None, progress: Progress = no_progress
 ) -> MadePhotoelastic:
     """Write a folder of NAME_ParticleData.dlm with matrices of forces; the same arguments give the same bytes.
 
@@ -53,8 +53,6 @@ def make_photoelastic(
         Folder to write; must be absent or empty.
     seed : int
     grains : int, optional
-    cache : Path, optional
-        Folder of simulated truths, read and added to.
     progress : Progress
 
     Raises
@@ -65,7 +63,7 @@ def make_photoelastic(
         If the simulation does not come to rest.
     """
     grains = check_output(out, grains)
-    truth = load_or_simulate(SCENARIOS["nearly_jammed"].loading, grains, seed, cache, progress)
+    truth = load_or_simulate(SCENARIOS["nearly_jammed"].loading, grains, seed, None, progress)
     rng = np.random.default_rng([seed, 3])
     pixel = 2.0 * float(truth.radius.mean()) / DIAMETER
     floor = float(truth.position[..., 1].max()) / pixel + DIAMETER

@@ -13,10 +13,9 @@ from ...solver.bodies.wall_shapes import STRAIGHT, Sides, all_sides
 from ...solver.dem.dem_truth import DemTruth
 from ...solver.dem.simulation import RAMP
 from .. import experiment_files
-from ..experiment_files import StatedInputs
+from ..experiment_files import FINEST_PRECISION, StatedInputs
 
 INTERVAL = 52.0  # [s] between photographs, as at the real test's rate
-FINEST_PRECISION = 1e-6  # [m], claimed of tracks without noise: tables are rounded, rods are elastic
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...solver.bodies.grains import Array
+from ...solver.bodies.rods import EARTH_GRAVITY
 from ...solver.dem.dem_truth import DemSettings
 from ..dense_packing import choose_two_radii, choose_wide_radii
 from .bed_paths import compress_in_membrane, press_footing, push_intruder, slide_box, turn_drum
@@ -82,8 +83,8 @@ SOFT = LoadingPath(shear, 0.25, plates=("top",), settings=DemSettings(normal_sti
 STIFF = DemSettings(normal_stiffness=2e8)
 RISING = LoadingPath(load_isotropically, 0.0, measured=("top", "right"), settings=STIFF)
 SOFTER = replace(SOFT, settings=DemSettings(normal_stiffness=3e5))
-HEAP = DemSettings(pressure=float("nan"), gravity=(0.0, -9.81), normal_stiffness=2e6)
-DISCS = DemSettings(normal_stiffness=4e5, friction=0.3, wall_friction=0.3, base_friction=10.0)
+HEAP = DemSettings(pressure=float("nan"), gravity=(0.0, -EARTH_GRAVITY), normal_stiffness=2e6)
+DISCS = DemSettings(normal_stiffness=4e5, friction=0.3, wall_friction=0.3, base_drag=10.0)
 # Stiff discs, whose overlaps are smaller than the errors of tracked rims, loaded without sliding.
 FRINGED = LoadingPath(load_isotropically, 0.0, settings=DemSettings(friction=0.3), sizes=choose_two_radii)
 FRINGED_LOADINGS: dict[FringedPreset, LoadingPath] = {
@@ -320,7 +321,7 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     ),
     "stiff_noise_40": _missing("stiff; 40 µm noise", _sheared(normal_stiffness=2e8), noise=4e-5),
     "base_friction": _missing(
-        "sheared on a base with friction of 10 % of the mean force", _sheared(base_friction=150.0)
+        "sheared on a base with friction of 10 % of the mean force", _sheared(base_drag=150.0)
     ),
     "cohesion": _missing("sheared; contacts attract by 10 % of the mean force", _sheared(adhesion=5.0)),
     "strong_cohesion": _missing("sheared; contacts attract by 40 % of the mean force", _sheared(adhesion=20.0)),

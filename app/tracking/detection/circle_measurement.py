@@ -43,6 +43,7 @@ TYPICAL_BLUR = 0.7
 # Width of the blur [px] that first chooses the fitted part of a ray; the estimate is repeated with its own width.
 BLUR_EXTENT = 1.0
 BLUR_ROUNDS = 2
+BLURRED_GRAINS = 60  # whose profiles are fitted
 
 
 Kernel = Callable[..., None]
@@ -145,10 +146,10 @@ class CircleMeasurer:
             np.full(count, MIN_POINTS), np.where(small & (not self.plain), MIN_VIEW_SMALL, MIN_VIEW),
         ])  # fmt: skip
 
-    def estimate_blur(self, circles: Sequence[MeasuredCircle], *, most: int = 60) -> float:
+    def estimate_blur(self, circles: Sequence[MeasuredCircle]) -> float:
         """Estimate the width of the photograph's blur [px]: that with the best fits of the profiles of some grains."""
         good = [one for one in circles if one.quality > 0.0]
-        good = good[:: max(len(good) // most, 1)]
+        good = good[:: max(len(good) // BLURRED_GRAINS, 1)]
         outlines = []
         for one in good:
             outline = trace_outline(self._coefficients, *one.circle, 2.0, narrow=self.narrow(one.radius))

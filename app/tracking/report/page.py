@@ -34,7 +34,7 @@ TEMPLATE = Path(__file__).with_name("page.html")
 
 WORST = 12  # grains shown in close-up
 LISTED = 200  # lost and suspect poses that are listed
-DOUBTFUL = (TrackStatus.SUSPECT, TrackStatus.LOST)
+AMBIGUOUS = (TrackStatus.SUSPECT, TrackStatus.LOST)
 
 Facts = dict[str, Any]  # values by their names in the template
 
@@ -74,7 +74,7 @@ def tracking_report(tracked: TrackingReportData) -> str:
         ramp=[f"rgb({red}, {green}, {blue})" for blue, green, red in RAMP],
         full_colour=FULL_COLOUR,
         worst=_worst(tracked, reference),
-        **_doubtful(tracked),
+        **_ambiguous(tracked),
     )
 
 
@@ -197,10 +197,10 @@ def _facts_of_pose(tracks: Tracks, frame: int, row: int) -> list[str]:
     return facts
 
 
-def _doubtful(tracked: TrackingReportData) -> Facts:
+def _ambiguous(tracked: TrackingReportData) -> Facts:
     """Lost and suspect poses as the rows of a table of corrections."""
     tracks = tracked.tracks
-    found = np.argwhere(np.isin(tracks.status, DOUBTFUL))
+    found = np.argwhere(np.isin(tracks.status, AMBIGUOUS))
     lines = []
     for frame, row in found[:LISTED]:
         number = tracked.frames.number(int(frame))
@@ -208,7 +208,7 @@ def _doubtful(tracked: TrackingReportData) -> Facts:
         theta = tracks.rotation[frame, row]
         pose = f"{x:.2f},{y:.2f},{theta:.4f}" if np.isfinite(x) else "lost,lost,lost"
         lines.append(f"{number},{tracks.id[row]},{pose}")
-    return {"doubtful": lines, "doubtful_count": len(found)}
+    return {"ambiguous": lines, "ambiguous_count": len(found)}
 
 
 def _frames_to_show(tracks: Tracks, first: int) -> list[int]:

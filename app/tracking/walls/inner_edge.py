@@ -11,6 +11,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
 from ...solver.even_subset import even_subset
+from ...solver.robust_scale import NORMAL_MEDIAN
 
 BLUR = 1.5  # [px] standard deviation of the smoothing: paint is finer than a bar
 SPACING = 3.0  # [px] between profiles along a line
@@ -22,7 +23,6 @@ BORDER = 6.0  # [px] beside the profiles that their smoothing needs
 CENTRED = 3.5  # [px] half width of the slopes whose centre is the edge
 CENTRED_PASSES = 5
 MAX_SDS, LEAST_CUT = 2.0, 0.5  # standard deviations and [px] beyond which a centre is that of something else
-NORMAL_MEDIAN = 0.6745  # standard deviations in the median deviation of normal errors
 MIN_CONTRAST = 0.5  # of an edge that is measured, over the strongest ones: between rods the bar borders on the dark
 MIN_PROFILES = 4
 ENDS = np.array([[1.0, -0.5], [1.0, 0.5]])  # offsets of a line's ends by that of its middle and their difference

@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull
 from ...solver.bodies.disc_pairs import find_disc_pairs
 from ...solver.bodies.grains import Array
 
+BARS = 4  # of a frame
 RIM_POINTS = 360  # points on the outline of a rod, from which the hull is computed
 SAME_BAR = np.deg2rad(1.5)  # greatest angle between the hull's sides of one bar
 MIN_ANGLE = np.deg2rad(12.0)  # least angle between two bars
@@ -20,7 +21,7 @@ MOST_HELD = 0.8  # of the circles
 FEW, ROUNDS = 2, 3
 
 
-def find_bars(x: Array, y: Array, radius: Array, count: int = 4) -> Array:
+def find_bars(x: Array, y: Array, radius: Array) -> Array:
     """Find the lines that bound circles on their longest sides: the faces of a frame's bars.
 
     Circles that the others do not hold, as bolts and spots of a bar's paint, are left out, and one or two that a line
@@ -30,25 +31,23 @@ def find_bars(x: Array, y: Array, radius: Array, count: int = 4) -> Array:
     ----------
     x, y, radius : (n,) array
         Circles [px].
-    count : int
-        Greatest number of lines.
 
     Returns
     -------
     (w, 2, 2) array
         Lines from corner to corner [px], the packing on their left in the world, counter-clockwise around it, the
-        lowest in the picture first; fewer than `count` where the hull has fewer sides.
+        lowest in the picture first; fewer than four where the hull has fewer sides.
     """
     circles = np.column_stack([x, y, radius])
     circles = circles[are_held(x, y, radius)]
-    lines = _hull_lines(circles, count)
+    lines = _hull_lines(circles, BARS)
     for _ in range(ROUNDS):
         touching = _touching(lines, circles)
         number = touching.sum(axis=1)
         left = circles[~touching[number <= FEW].any(axis=0)]
         if not (number <= FEW).any() or len(left) < MOST_HELD * len(circles):
             break
-        moved = _hull_lines(left, count)
+        moved = _hull_lines(left, BARS)
         # A free surface rests on few circles as well, and on few others below them.
         if len(moved) != len(lines) or _touching(moved, circles).sum(axis=1).min() <= number.min() + FEW:
             break

@@ -11,9 +11,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ...process.machine.browser import redirect_page
 from ...recording.viewing.connections import Connections, is_other_user
-from ...recording.viewing.gate import SAFE_HEADERS, Gate
-
-HEADERS = ("Host", "Origin", "Sec-Fetch-Site", "Content-Type", "Cookie")
+from ...recording.viewing.gate import READ_HEADERS, SAFE_HEADERS, Gate
 
 
 class Guard:
@@ -65,7 +63,7 @@ class Guard:
             if len(request.headers.getlist(name)) > 1:
                 return PlainTextResponse(f"the header {name} is given twice", 400)
         entering = request.url.path == "/" and "token" in request.query_params
-        headers = {name: value for name in HEADERS if (value := request.headers.get(name)) is not None}
+        headers = {name: value for name in READ_HEADERS if (value := request.headers.get(name)) is not None}
         beginning = request.url.path[: len(self.open_path)].encode()
         is_open = secrets.compare_digest(beginning, self.open_path.encode())
         objection = self.gate.objection(headers, changes=request.method != "GET", entering=entering or is_open)

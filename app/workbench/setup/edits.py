@@ -39,6 +39,7 @@ GRAIN_COLUMNS = ("id", "x", "y", "radius")
 OVERLAP = 0.15  # [radii] that a rod added by hand may overlap others: clicks and fits have errors
 # Radii form classes where so many, from so many rods on, are within so much of one of so few classes.
 NEARLY_ALL, FEWEST_EVIDENT, EVIDENT, MOST_EVIDENT = 0.85, 20, 0.015, 5
+MOST_CLASSES = 8  # of radii
 RARE = 0.08  # fraction of the rods that no class has
 # Densities [kg/m³] and textbook friction coefficients of dry, clean rods: initial values.
 MATERIALS: dict[str, dict[str, float]] = {
@@ -299,14 +300,14 @@ def snapped_to(radii: Sequence[float], rods: GrainGuess, scale: Scale) -> GrainG
     return GrainGuess(rods.id, rods.x, rods.y, sizes[nearest])
 
 
-def find_classes(radius: Array, most: int = 8) -> Array:
+def find_classes(radius: Array) -> Array:
     """Find radius classes (k,), in the unit of the radii: gaps in the sorted radii separate them."""
     ordered = np.sort(radius)
     if len(ordered) < 2:
         return ordered
     gap = np.diff(ordered)
     parts = np.split(ordered, np.flatnonzero(gap > np.maximum(0.035 * ordered[1:], 3.0 * np.median(gap))) + 1)
-    large = sorted((each for each in parts if len(each) >= max(2, 0.01 * len(ordered))), key=len)[-most:]
+    large = sorted((each for each in parts if len(each) >= max(2, 0.01 * len(ordered))), key=len)[-MOST_CLASSES:]
     return np.sort(np.array([np.median(each) for each in large or [ordered]]))
 
 

@@ -99,15 +99,14 @@ class ValidationResult:
     missing: list[MissingNumbers] = field(default_factory=list)  # between their names
     all_files: tuple[Path, ...] = ()  # photographs that match, in natural order
     number: tuple[int, ...] = ()  # place in time of every photograph, in intervals
+    experiment: Experiment | None = None  # with substitutes for a missing scale and missing times
+    other_messages: list[str] = field(default_factory=list)  # those that concern no step
 
     @property
     def left_out(self) -> tuple[Path, ...]:
         """The photographs that match, but are not used."""
         used = set(self.files)
         return tuple(file for file in self.all_files if file not in used)
-
-    experiment: Experiment | None = None  # with substitutes for a missing scale and missing times
-    other_messages: list[str] = field(default_factory=list)  # those that concern no step
 
     @property
     def ready(self) -> bool:

@@ -4,7 +4,8 @@ import math
 from dataclasses import replace
 
 import pytest
-from rodsight.inference.diagnosis.data_quality import REFERENCE_STEP, DataQuality
+from rodsight.inference.diagnosis.data_quality import DataQuality
+from rodsight.solver.part_settings import REFERENCE_STEP
 
 GOOD = DataQuality(3, 1e-5, 1e-5, 1.2e-4, REFERENCE_STEP, 0.2, 0.1, -5e-6, 1.4e-5, 0.016)
 

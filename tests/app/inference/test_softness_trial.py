@@ -36,7 +36,7 @@ def corrected(monkeypatch):
 @dataclass(frozen=True)
 class Sequence:
     softness_hidden: bool
-    noise_remark: str = "noise is larger than stated"
+    remark: str = "noise is larger than stated"
 
 
 def solved(monkeypatch, expected: float, rise: float) -> list[tuple[object, bool]]:
@@ -58,8 +58,8 @@ def test_soft_grains_that_fit_clearly_better_are_used(inputs, corrected, monkeyp
     assert used == replace(inputs, material=replace(inputs.material, stiffness="estimate"))
     assert corrected == [None, "estimate"]
     assert tried == [(None, False), ("estimate", False)]  # without rods that no photograph shows
-    assert sequence.noise_remark.startswith("noise is larger than stated; overlaps are read as forces of soft grains")
-    assert "falls to 49 %" in sequence.noise_remark
+    assert sequence.remark.startswith("noise is larger than stated; overlaps are read as forces of soft grains")
+    assert "falls to 49 %" in sequence.remark
 
 
 @pytest.mark.parametrize(("expected", "rise"), [(0.7, SHOWN - 0.01), (FITS + 0.001, 1.0)])

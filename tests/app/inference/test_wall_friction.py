@@ -70,11 +70,7 @@ def test_a_friction_of_walls_or_base_that_is_not_stated_is_used_where_the_slidin
         scenario == "smooth_walls",
         scenario == "base_friction",
     )
-    assert (
-        (words in solved.sequence.noise_remark)
-        if words
-        else "calibration.resistance" not in solved.sequence.noise_remark
-    )
+    assert (words in solved.sequence.remark) if words else "calibration.resistance" not in solved.sequence.remark
     r = [agreement(frame, true) for frame, true in zip(solved.frames[3:], solved.true[3:], strict=True)]
     assert np.mean(r) > least
     as_stated = replace(solved.inputs, settings=replace(solved.inputs.settings, resistance=False))

@@ -94,6 +94,11 @@ def test_every_message_has_its_cure():
         topic = topic_of(message)
         assert topic is not None, f"no topic in cures.toml for {message.source}"
         assert topic.cure(message), f"no cure for {message}"
+        assert re.search(r"[^\W\d_]{2,}.*[^\W\d_]{2,}", message.text), f"{message} names no fault"
+
+
+def test_the_page_of_commands_keeps_paragraphs():
+    assert "\n\nFactors and their ranges: " in TEXTS["commands.md"]
 
 
 @pytest.mark.parametrize(

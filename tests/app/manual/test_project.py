@@ -81,3 +81,22 @@ def test_the_paper_has_the_sections_that_the_journal_requires():
     ):  # fmt: skip
         assert f"\n## {heading}\n" in text
     assert 750 <= len(re.findall(r"\w+", text.partition("## Summary")[2])) <= 1750
+
+
+@pytest.mark.parametrize(("folder", "container"), [("app", "rodsight"), ("solver", "rodsight.solver")])
+def test_the_page_of_the_architecture_has_the_layers_that_are_checked(folder, container):
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    checked = next(each["layers"] for each in contracts if each.get("containers") == [container])
+    page = (ROOT / "app/docs/architecture.md").read_text(encoding="utf-8")
+    rows = page.partition(f"| `{folder}/` | content |")[2].partition("\n\n")[0].splitlines()[2:]
+    stated = [set(row.split("|")[1].strip().split(" · ")) for row in rows]
+    assert stated == [set(layer.split(" | ")) for layer in checked]
+
+
+def test_the_readme_lists_every_package():
+    table = (ROOT / "README.md").read_text(encoding="utf-8").partition("| package | content | depends on |")[2]
+    for each in (ROOT / "app").iterdir():
+        if (each / "__init__.py").is_file():
+            assert f"`app/{each.name}/`" in table
+        elif each.suffix == ".py" and each.name != "__init__.py":
+            assert f"`app/{each.name}`" in table

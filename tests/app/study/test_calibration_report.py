@@ -23,7 +23,7 @@ def study():
     none = np.zeros(COUNT, np.bool_)
     errors = ContactErrors(
         scenario=np.full(COUNT, "shear"), seed=np.zeros(COUNT, np.int64), frame=np.ones(COUNT, np.int64),
-        group=np.ones(COUNT, np.uint8), wall=rng.random(COUNT) < 0.1, sliding=none, doubtful=none,
+        group=np.ones(COUNT, np.uint8), wall=rng.random(COUNT) < 0.1, sliding=none, ambiguous=none,
         evidence_source=np.zeros(COUNT, np.uint8), terms=np.zeros((COUNT, len(Term))),
         force=rng.random((COUNT, 2)) * 2,
         error=rng.standard_normal((COUNT, 2)), sd=np.ones((COUNT, 2)), formula_sd=np.ones((COUNT, 2)),
@@ -59,9 +59,9 @@ def test_the_page_names_version_seeds_and_the_hash_of_its_data(study):
         "seeds",
         "sliding_fraction",
         "All stated quantities are within",
-        "doubtful",
+        "ambiguous",
     ):
-        assert (word in page) == (word != "doubtful"), word  # no doubtful contacts
+        assert (word in page) == (word != "ambiguous"), word  # no ambiguous contacts
     assert page.count("<tr><td>shear</td>") == 2  # its intervals and its sliding fraction
     narrow = report_page(replace(study, errors=replace(study.errors, sd=0.8 * study.errors.sd)))
     assert ("f_n 68 −" in page, "f_n 68 −" in narrow) == (False, True)

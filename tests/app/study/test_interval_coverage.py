@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rodsight.solver.assessment.intervals.force_intervals import Group, Term
+from rodsight.study.fitting.coverage import COVERED
 from rodsight.study.scenarios.contact_errors import ContactErrors, measure_errors
-from rodsight.study.scenarios.interval_coverage import COVERED, TOLERANCE, covered, describe_violations, interval_score
+from rodsight.study.scenarios.interval_coverage import TOLERANCE, covered, describe_violations, interval_score
 from rodsight.study.scenarios.interval_fit import fit_intervals
 from rodsight.study.scenarios.scenario_score import StudyPlan
 from rodsight.study.scenarios.solved_scenario import solve_one
@@ -23,7 +24,7 @@ def _errors(rng: np.random.Generator) -> ContactErrors:
     none = np.zeros(COUNT, np.bool_)
     return ContactErrors(
         scenario=np.where(np.arange(COUNT) % 2 == 0, "shear", "biaxial"), seed=np.zeros(COUNT, np.int64),
-        frame=np.ones(COUNT, np.int64), group=group, wall=none, sliding=none, doubtful=none,
+        frame=np.ones(COUNT, np.int64), group=group, wall=none, sliding=none, ambiguous=none,
         evidence_source=np.zeros(COUNT, np.uint8), terms=np.column_stack([penalty, *np.zeros((len(Term) - 1, COUNT))]),
         force=np.ones((COUNT, 2)),
         error=size[:, None] * formula * rng.standard_normal((COUNT, 2)), sd=formula, formula_sd=formula,

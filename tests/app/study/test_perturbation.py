@@ -104,4 +104,4 @@ def test_the_worst_frame_is_named_with_and_without_a_truth():
 def test_an_experiment_is_for_the_study_of_perturbations_only(capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit, match="2"):
         main(["study", "worlds", "somewhere"])
-    assert "a path applies to real, perturbation, paper" in capsys.readouterr().err
+    assert "applies to real, perturbation and paper only" in capsys.readouterr().err

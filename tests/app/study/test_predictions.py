@@ -116,7 +116,7 @@ def test_rival_inputs_are_compared_where_the_first_twelve_photographs_leave_them
     monkeypatch.setattr(prediction, "measure_data_quality", lambda *_: GOOD)
     monkeypatch.setattr(prediction, "solve_trial", solve)
     monkeypatch.setattr(prediction, "diagnose", lambda inputs, trial, progress: diagnosed.append(trial) or ())
-    monkeypatch.setattr(prediction, "DOUBTFUL", 0.9)
+    monkeypatch.setattr(prediction, "COMPARED", 0.9)
     found = prediction.predict_accuracy("config", TRACKS, "walls")
     assert found.trial == Trial((evidence,), 12)
     assert solved == ([12, 6] if compared else [12])

@@ -140,7 +140,9 @@ def wait_until(test):
 
 @pytest.mark.thorough
 def test_a_run_outlives_its_server_and_is_found_again(orphan):
-    time.sleep(0.5)  # it has written since
+    log = orphan.place / jobs.OUTPUT
+    size = log.stat().st_size
+    wait_until(lambda: log.stat().st_size > size)  # it writes without its server
     orphan.find()
     assert orphan.as_values()["state"] == JobState.RUNNING
     assert "ready" in orphan.as_values()["messages"] or not orphan.as_values()["messages"]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import shutil
 import subprocess
 import sys
-import time
+import threading
 from dataclasses import asdict
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from rodsight.process.atomic import write_atomically
 from rodsight.process.errors import InputError
 from rodsight.process.lock import LOCK, Holder, hold_folder
 from rodsight.run_folder import Run, hold_run
-from rodsight.workbench.running.job import OUTPUT, POLLING, PROCESS, Job
+from rodsight.workbench.running.job import OUTPUT, PROCESS, Job
 from rodsight.workbench.service.workbench import Workbench
 from rodsight.workbench.setup.journal import PLACE
 
@@ -93,8 +94,16 @@ def test_a_log_under_a_second_name_keeps_its_content(root, monkeypatch):
 
 
 @pytest.mark.parametrize("is_run", [False, True])
-def test_only_a_run_is_found_and_ended_and_no_other_process_that_a_file_names(root, is_run):
+def test_only_a_run_is_found_and_ended_and_no_other_process_that_a_file_names(root, is_run, monkeypatch):
     """The file may come with the folder, and name any process of this user."""
+    calls, polled, is_alive = itertools.count(), threading.Event(), Job._is_alive
+
+    def counted(job, process):
+        if next(calls) > 1:
+            polled.set()
+        return is_alive(job, process)
+
+    monkeypatch.setattr(Job, "_is_alive", counted)
     place, results = root / "tracked" / PLACE, root / "runs" / "tracked"
     place.mkdir()
     marks = ("run" if is_run else "look", str(root / "tracked"), "--out", str(results))
@@ -109,7 +118,8 @@ def test_only_a_run_is_found_and_ended_and_no_other_process_that_a_file_names(ro
         (place / PROCESS).write_text(json.dumps(stored))
         job = Job(root, root / "tracked", results, place)
         job.find()
-        time.sleep(4 * POLLING)  # its log is missing, which is found out beside
+        if is_run:
+            assert polled.wait(30.0)  # its log is missing, which is found out beside
         assert job.is_running == is_run
         if not is_run:
             job.close()

@@ -189,7 +189,7 @@ MUTANTS = [
         ("check.measured, 1.0 / COVERAGE_FACTOR)", "check.measured, 1.0)"),
         ("BEYOND_WALL_LOSS * beyond / max(evidence.grains, 1)", "BEYOND_WALL_LOSS * beyond / 100.0"),
         ("check.measured, 1.0 - frame.position_weight\n", "check.measured, 1.0\n"),
-        ("if evidence.shear > COARSE_STEP and", "if"),
+        ("if evidence.shear > REFERENCE_STEP and", "if"),
         ("key=lambda name: lost.get(name, 0.0))] =", "key=lambda name: -lost.get(name, 0.0))] ="),
         ("kept * expected, kept * bound", "expected, kept * bound"),
     ),

@@ -154,7 +154,10 @@ MUTANTS = [
         ("rows[2 * count : 3 * count] = TORQUE_WEIGHT", "pass"),
         ("drag=None, moment=None, moment_sd=None", "moment=None, moment_sd=None"),
         ("+ 4.0 * now.sigma**2", ""),
-        ("share = packing.grains.mass / packing.grains.mass.mean()", "share = np.ones(packing.grains.count)"),
+        (
+            "relative_mass = packing.grains.mass / packing.grains.mass.mean()",
+            "relative_mass = np.ones(packing.grains.count)",
+        ),
         ("after.position - before.position", "before.position - after.position"),
         ("packing.material.friction <= 0.0 or packing.material.wall_friction <= 0.0", "False"),
     ),

@@ -20,8 +20,11 @@ MUTANTS = [
         ("(below + value[states - k]) * decay[states - k]", "below * decay[states - k] + value[states - k]"),
         ("touch[f, c] = alpha[f, 0] * beta[1, 0] / evidence", "touch[f, c] = alpha[f, 0]"),
         ("alpha[0, q] = start[q] * emission[0, q]", "alpha[0, q] = emission[0, q]"),
-        ("width[q] / (width[q] + error)", "error / (width[q] + error)"),
-        ("second += weight * (middle * middle + width[q] * (1.0 - gain))", "second += weight * middle * middle"),
+        ("state_variance[q] / (state_variance[q] + error)", "error / (state_variance[q] + error)"),
+        (
+            "second += weight * (middle * middle + state_variance[q] * (1.0 - gain))",
+            "second += weight * middle * middle",
+        ),
     ),
     *mutants_of(
         "solver/detection/touch_probability.py",

@@ -314,7 +314,7 @@ MUTANTS = [
         ),
         ("if not sequence.packing.scale_is_known:", "if False:"),
         ("drag / sequence.base_gravity", "drag"),
-        ("max(1, (len(snapshots) - FRAMES) // 2)", "0"),
+        ("max(1, (len(snapshots) - COMPARED_FRAMES) // 2)", "0"),
         ('"photographs_reversed": 0.02', '"photographs_reversed": 0.1'),
     ),
     *mutants_of(
@@ -349,7 +349,7 @@ MUTANTS = [
         ("reason = obstacle or worst.words", "reason = obstacle"),
         ("if worst.little_known else", "if True else"),
         ("return self.remark or NOT_PREDICTED", "return NOT_PREDICTED"),
-        ("trial is not None and trial.expected[0] < DOUBTFUL", "False"),
+        ("trial is not None and trial.expected[0] < COMPARED", "False"),
         ("if walls is None:", "if False:"),
         ("solve_trial(inputs, PREDICTED_PHOTOGRAPHS,", "solve_trial(inputs, 2,"),
     ),

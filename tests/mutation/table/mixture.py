@@ -64,9 +64,9 @@ MUTANTS = [
         ("fn) <= MAX_CHANGE * sd:", "fn) <= 0.0 * sd:"),
         ("        price = EXACT * settings.balance\n", "        price = settings.balance\n"),
         ("MAX_CHANGE_SOFT if soft else", "MAX_CHANGE_RELAXED if soft else"),
-        ("share = min((total - reached) / change, 1.0)", "share = 1.0"),
+        ("step = min((total - reached) / change, 1.0)", "step = 1.0"),
         ("reached + wanted.weight * (wanted.total - reached)", "wanted.total"),
-        ("found.ft + share * (other.ft - found.ft)", "found.ft"),
+        ("found.ft + step * (other.ft - found.ft)", "found.ft"),
         ("change * (total - reached) > 0.0", "True"),
     ),
     *mutants_of(

@@ -10,7 +10,6 @@ from rodsight.solver.assessment.intervals.force_intervals import FRICTION_ERROR
 from rodsight.solver.assessment.motion_information import MotionInformation
 from rodsight.solver.assessment.penalties import (
     BEYOND_WALL_LOSS,
-    COARSE_STEP,
     INNER_BOUNDARY_LOSS,
     SOFT_CHAIN_LOSS,
     assess,
@@ -26,6 +25,7 @@ from rodsight.solver.assessment.trust import motion_assessment
 from rodsight.solver.contacts.contacts import ContactState
 from rodsight.solver.convex.friction_check import FrictionCheck
 from rodsight.solver.frame_forces import FrameStatus
+from rodsight.solver.part_settings import REFERENCE_STEP
 from rodsight.solver.sequence.failure import failed_frame
 
 from tests.app.recording.fake_results import make_results
@@ -70,9 +70,9 @@ def test_every_penalty_lowers_the_trust_and_states_cause_and_cure(evidence, word
 
 
 def test_a_wide_step_is_named_where_the_force_pattern_is_new():
-    wide = replace(ASSESSED, shear=4 * COARSE_STEP, force_change=0.5, correction=0.4)
+    wide = replace(ASSESSED, shear=4 * REFERENCE_STEP, force_change=0.5, correction=0.4)
     assert describe_penalties(find_penalties(wide)).count("moved as by 1° of shear since the photograph before") == 1
-    assert "of shear since" not in describe_penalties(find_penalties(replace(wide, shear=COARSE_STEP)))
+    assert "of shear since" not in describe_penalties(find_penalties(replace(wide, shear=REFERENCE_STEP)))
 
 
 def test_penalties_beside_the_evidence_have_their_size():

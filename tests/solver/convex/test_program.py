@@ -294,5 +294,5 @@ def test_noise_takes_its_share_off_the_power_that_forces_could_dissipate():
     clear = solve_convex_member(balance, slip, touch, none, none)
     noisy = solve_convex_member(balance, slip, touch, none, none, noise=1.0)
     assert noisy.fn.sum() > clear.fn.sum()
-    assert gap(noisy, settings.noise_share) < gap(clear, settings.noise_share)
+    assert gap(noisy, settings.noise_fraction) < gap(clear, settings.noise_fraction)
     assert gap(clear, 0.0) < gap(noisy, 0.0)

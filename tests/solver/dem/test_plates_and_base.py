@@ -112,7 +112,7 @@ def test_rolling_resistance_holds_a_rod_on_an_incline_up_to_its_angle(degrees: f
 def test_base_stops_a_sliding_and_rotating_rod() -> None:
     deceleration, speed = 5.0, 0.1
     spin = 0.2 * speed / RADIUS
-    cell = rods((0.5, 0.5), settings=replace(HELD, base_friction=deceleration), velocity=(speed, 0.0, spin))
+    cell = rods((0.5, 0.5), settings=replace(HELD, base_drag=deceleration), velocity=(speed, 0.0, spin))
     cell.run(np.zeros(round(2.0 * speed / deceleration / cell.time_step)))
     rotation = cell.photograph(0).rotation[0]
     assert np.linalg.norm(cell.velocity[0, :2]) < FIRST_ORDER * speed
@@ -122,7 +122,7 @@ def test_base_stops_a_sliding_and_rotating_rod() -> None:
 
 
 def test_base_holds_a_rod_below_its_friction() -> None:
-    cell = rods((0.5, 0.5), settings=replace(HELD, base_friction=5.0, gravity=(2.0, -2.0)))
+    cell = rods((0.5, 0.5), settings=replace(HELD, base_drag=5.0, gravity=(2.0, -2.0)))
     cell.run(np.zeros(3000))
     assert np.abs(cell.position[0] - 0.5).max() < 1e-6
 

@@ -6,7 +6,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from ....drawing.force_range import ForceRange
+from ....drawing.force_range import DIFFERENCE_FRACTION, ForceRange
 from ....solver.bodies.grains import Array
 from ....solver.contacts.contacts import measure_pairs
 from ...look import entities
@@ -17,8 +17,6 @@ from ...look.ramp_legend import PIECES, log_ramp_legend
 from ...look.scene import Scene
 from ...look.values import nullable
 from .network import body_values
-
-DIFFERENCE_FRACTION = 0.4  # of the drawn range of forces: the difference drawn widest and brightest
 
 _RAMP = packed(DIFFERENCE_RAMP)
 

@@ -24,6 +24,7 @@ from rodsight.workbench.service.workbench import Workbench
 
 KINDS = ("workbench", "recording")
 MANY, DESCRIPTORS = 330, 256
+OTHERS = 2 * connections.UNKNOWN_LIMIT
 LIMITED = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_NOFILE, (int(sys.argv[3]), int(sys.argv[3])))
@@ -154,9 +155,10 @@ def test_a_connection_with_the_cookie_is_kept_among_many_others(kind, tmp_path, 
         request = f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{gate.port}\r\nCookie: {gate.cookie_name}={gate.secret}\r\n\r\n"
         own.sendall(request.encode())
         assert b" 200 " in own.recv(65536)
-        for _ in range(2 * connections.UNKNOWN_LIMIT):
-            stack.callback(socket.create_connection(("127.0.0.1", gate.port), timeout=20.0).close)
-        time.sleep(0.8)  # past the deadline of the others
+        others = [socket.create_connection(("127.0.0.1", gate.port), timeout=20.0) for _ in range(OTHERS)]
+        for each in others:
+            stack.callback(each.close)
+            assert read_all(each) == b""  # at its deadline, or as the oldest of too many
         own.settimeout(0.2)
         with contextlib.suppress(TimeoutError):
             while own.recv(1 << 20):

@@ -5,37 +5,40 @@ from __future__ import annotations
 import json
 import shutil
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import get_args
 
-from ..process.atomic import write_atomically
-from ..process.errors import InputError
-from ..process.frame_range import ALL_FRAMES
-from ..synthetic.scenarios.preset_names import FringedPreset
-from .stored_results import load_run
-from .terminal import print_line, progress_of, table_console
+from ...process.atomic import write_atomically
+from ...process.errors import InputError
+from ...process.frame_range import ALL_FRAMES
+from ...synthetic.scenarios.preset_names import FringedPreset
+from ..stored_results import load_run
+from ..terminal import print_line, progress_of, table_console
+from .study_request import StudyRequest
+
+FRINGED_GRAINS = 200  # of simulated photoelastic discs
 
 
-def study_measured(folder: Path | None, page: Path | None, frame: int | None, *, as_json: bool) -> int:
+def study_measured(request: StudyRequest) -> int:
     """Compare a run with measured forces and print the agreement; files of PeGS are solved first. Returns 0."""
-    from ..exchange.foreign.pegs import is_pegs
-    from ..run_truth import load_truth
-    from ..study.real import real_forces, real_page
+    from ...exchange.foreign.pegs import is_pegs
+    from ...run_truth import load_truth
+    from ...study.real import real_forces, real_page
 
+    folder, page = request.folder, request.page
     if folder is None:
-        raise InputError("study real", "RUN", "is missing: give the folder of a run, such as runs/my_test")
-    run, results = load_run(_solve(folder, quiet=as_json) if is_pegs(folder) else folder)
+        raise InputError("study real", "PATH", "is missing: give the folder of a run, such as runs/my_test")
+    run, results = load_run(_solve(folder, quiet=request.quiet or request.as_json) if is_pegs(folder) else folder)
     truth = load_truth(run, results)
     if truth is None or run.experiment.config.truth is None:
         raise InputError(run.experiment.file, "key truth", "is missing: there are no measured forces to compare with")
     sides = real_forces.correlate_sides(
         run.experiment.folder / run.experiment.config.truth, run.frames, len(results.frames)
     )
-    found = real_forces.study_real(results, truth, sides, frame)
+    found = real_forces.study_real(results, truth, sides, request.frame)
     if page is not None:
         write_atomically(page, real_page.real_page(found).encode())
-    if as_json:
+    if request.as_json:
         print(json.dumps(real_forces.as_json(found), indent=1))
         return 0
     real_page.print_real(table_console(real_page.WIDTH), found)
@@ -44,22 +47,23 @@ def study_measured(folder: Path | None, page: Path | None, frame: int | None, *,
     return 0
 
 
-def study_fringes(seeds: Sequence[int], grains: int, out: Path, *, quiet: bool) -> int:
+def study_fringes(request: StudyRequest) -> int:
     """Compare the forces of simulated photoelastic discs with and without their fringes, and print them. Returns 0."""
-    from .. import pipeline
-    from ..experiment.experiment import load_experiment
-    from ..run_folder import Run, hold_run
-    from ..study.real.fringe_gain import FringeGain, measure_gain, print_gains
-    from ..synthetic.photoelastic.fringe_photographs import make_fringed
+    from ... import pipeline
+    from ...experiment.experiment import load_experiment
+    from ...run_folder import Run, hold_run
+    from ...study.real.fringe_gain import FringeGain, measure_gain, print_gains
+    from ...synthetic.photoelastic.fringe_photographs import make_fringed
 
+    grains = FRINGED_GRAINS if request.grains is None else request.grains
     found: dict[str, list[FringeGain]] = {}
     for preset in get_args(FringedPreset):
-        for seed in seeds:
-            folder = out / "fringes" / f"{preset}_{grains}_{seed}"
+        for seed in request.seeds:
+            folder = request.out / "fringes" / f"{preset}_{grains}_{seed}"
             if not (folder / "experiment.toml").is_file():
-                with progress_of(quiet) as progress:
+                with progress_of(request.quiet) as progress:
                     make_fringed(folder, seed, preset=preset, grains=grains, progress=progress)
-            with progress_of(quiet) as progress:
+            with progress_of(request.quiet) as progress:
                 run = Run(load_experiment(folder), folder.with_name(f"{folder.name}_run"), ALL_FRAMES, progress)
                 with hold_run(run):
                     inputs, results, truth = pipeline.solved_inputs(run)
@@ -71,11 +75,11 @@ def study_fringes(seeds: Sequence[int], grains: int, out: Path, *, quiet: bool) 
 
 def _solve(folder: Path, *, quiet: bool) -> Path:
     """Import measured forces of photoelastic discs and infer them anew; returns the folder of the run."""
-    from .. import pipeline
-    from ..exchange.foreign.import_files import ImportRequest, import_files
-    from ..experiment.experiment import CONFIG_NAME, load_experiment
-    from ..run_folder import Run, hold_run
-    from ..run_truth import load_truth
+    from ... import pipeline
+    from ...exchange.foreign.import_files import ImportRequest, import_files
+    from ...experiment.experiment import CONFIG_NAME, load_experiment
+    from ...run_folder import Run, hold_run
+    from ...run_truth import load_truth
 
     name = folder.resolve().name
     place, began = Path("runs") / "real" / name, time.perf_counter()

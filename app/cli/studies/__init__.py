@@ -1,0 +1,1 @@
+"""What the subjects of the command study do. Depends on the studies, the pipeline and the terminal."""
