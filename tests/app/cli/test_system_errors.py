@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,10 +17,14 @@ FEW = ("--set", "solver.estimator=nlgs", "--set", "solver.sweeps=20", "--sweeps"
 @pytest.mark.thorough
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EACCES])
 def test_a_file_that_cannot_be_written_is_one_line(tracked, tmp_path, capsys, monkeypatch, number):
-    def refuse(self: Path, content: bytes) -> int:
-        raise OSError(number, os.strerror(number), str(self))
+    given = Path.open
 
-    monkeypatch.setattr(Path, "write_bytes", refuse)
+    def refuse(self: Path, mode: str = "r", *args: Any, **options: Any) -> Any:
+        if mode == "wb" and self.is_relative_to(tmp_path / "out"):
+            raise OSError(number, os.strerror(number), str(self))
+        return given(self, mode, *args, **options)
+
+    monkeypatch.setattr(Path, "open", refuse)
     assert rodsight("solve", tracked, "--out", tmp_path / "out", *FEW) == 1
     printed = capsys.readouterr()
     assert printed.out == ""
