@@ -116,8 +116,9 @@ def check_radii(sources: PackingSources, tracks: Tracks, *, packed: bool = True)
     if packed and len(spacing) and not SPACING[0] <= (found := float(np.median(spacing))) <= SPACING[1]:
         state = "overlap" if found < 1.0 else "stand apart"
         raise InputError(
-            file, key, f"does not fit the positions: neighbours {state}, their distance is {found:.2f} times "
-            f"the sum of their radii (median of frame 0); radii, not diameters, in metres{_cause_of_spacing(found)}",
+            file, key, f"does not fit the positions: neighbours {state}, their distance is {found:.2f} times the "
+            "sum of their radii (median of frame 0); radii, not diameters, in the unit of the positions"
+            f"{_cause_of_spacing(found)}",
         )  # fmt: skip
 
 

@@ -34,7 +34,7 @@ def initialise_experiment(folder: Path, flags: SetupFlags, *, quiet: bool) -> in
         heading = f"{SIGNS[step.mark.value]} {step.name}: {_summary(found, step.name)}"
         for text in (heading, *(f"    {sentence}" for sentence in step.messages)):  # with sections in brackets
             console.print(text, highlight=False, soft_wrap=True, markup=False)
-    console.print(f"Written: {folder / CONFIG_NAME}. Look at {folder / PICTURE}, then rodsight check {folder}.",
+    console.print(f"Written: {folder / CONFIG_NAME}. Look at {folder / PICTURE}, then: rodsight check {folder}",
                   highlight=False, soft_wrap=True, markup=False)  # fmt: skip
     return 0
 

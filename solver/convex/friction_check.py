@@ -116,7 +116,8 @@ def check_friction(
     measured = given * found.factor / BIAS
     relative_sd = 0.0 if np.isnan(found.factor_sd) else found.factor_sd / max(found.factor, 1e-12)
     half_width = COVERAGE_FACTOR * float(np.hypot(relative_sd, BIAS_SD))
-    sliding = float(np.mean(np.concatenate([frame.slip for frame in frames]) != 0.0))
+    slip = np.concatenate([frame.slip for frame in frames])
+    sliding = float(np.mean(slip != 0.0)) if len(slip) else np.nan
     return FrictionCheck(
         given, measured, measured * (1.0 - half_width), measured * (1.0 + half_width), first, last, found.enclosed,
         found.trial, found.gap, sliding=sliding,

@@ -21,13 +21,18 @@ FRINGED_GRAINS = 200  # of simulated photoelastic discs
 
 def study_measured(request: StudyRequest) -> int:
     """Compare a run with measured forces and print the agreement; files of PeGS are solved first. Returns 0."""
-    from ...exchange.foreign.pegs import is_pegs
+    from ...exchange.foreign.pegs import DISCS, POSITIONS, has_forces, is_pegs
     from ...run_truth import load_truth
     from ...study.real import real_forces, real_page
 
     folder, page = request.folder, request.page
     if folder is None:
         raise InputError("study real", "PATH", "is missing: give the folder of a run, such as runs/my_test")
+    if is_pegs(folder):
+        if not has_forces(folder):
+            raise InputError(folder, "", "holds no measured forces to compare with: PeGS 2 writes Adjacency_list.txt")
+    elif folder.is_dir() and not (folder / "results.h5").exists():
+        raise InputError(folder, "", f"is neither a run (results.h5) nor files of PeGS ({POSITIONS}, *{DISCS})")
     run, results = load_run(_solve(folder, quiet=request.quiet or request.as_json) if is_pegs(folder) else folder)
     truth = load_truth(run, results)
     if truth is None or run.experiment.config.truth is None:

@@ -86,6 +86,11 @@ def import_files(request: ImportRequest, folder: Path) -> tuple[ImportedTracks, 
     precision = foreign.precision_of(request.precision)
     imported = make_tracks(foreign.observed, convention, precision)
     stated = None if request.precision is None else ("--precision", f"{precision:g} m")
+    if request.precision is None and foreign.precision is None:
+        assumed = (
+            f"No precision is given: {precision:.3g} m is assumed, {foreign.relative_precision:g} of a mean diameter."
+        )
+        imported = replace(imported, remarks=(*imported.remarks, f"{assumed} Give --precision."))
     discs = None if corners is None else make_corners(corners, imported, convention, request.corner_radius)
     contents = replace(_folder_contents(request, foreign, imported, convention), corners=discs)
     boundaries = (contents.walls, contents.corners, contents.cell)

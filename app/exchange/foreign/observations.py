@@ -96,6 +96,9 @@ def make_tracks(observed: Observations, convention: Convention, precision: float
     ids, names, row = _name_grains(observed.name)
     f, n = len(number), len(ids)
     _refuse_duplicates(observed, frame, row)
+    if f > 1 and n > f and n == len(row):
+        wrong = "every id occurs in one frame only: they number the rows; link the positions of the same grains first"
+        raise InputError(observed.rows.file, f"column {observed.id_column}", wrong)
     if not np.array_equal(number, np.arange(f)):
         even = f < 2 or len(set(np.diff(number).tolist())) == 1
         remarks.append(

@@ -61,12 +61,17 @@ def read_pegs(folder: Path) -> tuple[Observations, ForceReadings]:
         return _read_by_photograph(discs)
     if (folder / POSITIONS).exists():
         return _read_all(folder)
-    raise InputError(folder, "", f"contains neither *{DISCS} nor {POSITIONS}")
+    raise InputError(folder, "", f"contains neither *{DISCS} nor {POSITIONS}, which PeGS 2 writes (particleTrack)")
 
 
 def is_pegs(folder: Path) -> bool:
     """Return whether a folder holds files of PeGS in either format."""
     return folder.is_dir() and ((folder / POSITIONS).exists() or any(folder.glob(f"*{DISCS}")))
+
+
+def has_forces(folder: Path) -> bool:
+    """Return whether a folder of PeGS holds forces that were read from fringes."""
+    return (folder / CONTACTS).exists() or any(folder.glob(f"*{NORMAL}"))
 
 
 def read_edge(folder: Path) -> tuple[str, ...]:

@@ -68,7 +68,7 @@ class DataQuality:
     def describe(self) -> list[str]:
         """Describe noise, motion, sliding and gaps in one to four sentences."""
         step = math.degrees(self.shear)
-        stated = ", as stated" if self.noise == self.stated_noise else f" (stated: {1e6 * self.stated_noise:.3g} µm)"
+        stated = ", as given" if self.noise == self.stated_noise else f" (stated: {1e6 * self.stated_noise:.3g} µm)"
         lines = [
             f"First {self.photographs} photographs: positions have a noise of {1e6 * self.noise:.3g} µm{stated}, and "
             f"neighbours move by {1e6 * self.motion:.3g} µm in a step of {step:.2g}° of shear; "

@@ -12,7 +12,7 @@ GOOD = DataQuality(3, 1e-5, 1e-5, 1.2e-4, REFERENCE_STEP, 0.2, 0.1, -5e-6, 1.4e-
 
 def test_low_noise_and_sliding_are_described_without_an_obstacle():
     (line,) = GOOD.describe()
-    assert "a noise of 10 µm, as stated, and neighbours move by 120 µm in a step of 0.25° of shear" in line
+    assert "a noise of 10 µm, as given, and neighbours move by 120 µm in a step of 0.25° of shear" in line
     assert GOOD.obstacle == ""
 
 

@@ -167,3 +167,14 @@ def test_files_of_measured_forces_are_solved_and_compared_by_one_command(tmp_pat
         found = json.loads(capsys.readouterr().out)
         assert found["mean"]["ours"]["r"] > found["mean"]["uniform"]["r"]
     assert (tmp_path / "runs" / "real" / "discs" / "run" / "results.h5").is_file()
+
+
+@pytest.mark.parametrize(
+    ("files", "reason"),
+    [((), "is neither a run"), (("particle_positions.txt",), "holds no measured forces to compare with")],
+)
+def test_a_folder_without_measured_forces_is_refused_before_it_is_solved(tmp_path, capsys, files, reason) -> None:
+    for name in files:
+        (tmp_path / name).write_text("0 0 1 1 1 0\n")
+    assert rodsight("study", "real", tmp_path) == 2
+    assert reason in capsys.readouterr().err

@@ -39,6 +39,20 @@ def expect_rows(folder: Path) -> None:
     assert (folder / "ids.csv").read_text() == "id,name\n0,a\n1,b\n"
 
 
+def test_ids_that_number_the_rows_are_refused_and_an_assumed_precision_is_stated(tmp_path, capsys):
+    table = tmp_path / "any.csv"
+    places = [(k // 3, 8 * (k % 3)) for k in range(6)]  # of three grains in two frames
+    numbered = [f"{frame},{k},{x},20,0,4" for k, (frame, x) in enumerate(places)]
+    table.write_text("\n".join([",".join(COLUMN_NAMES), *numbered]))
+    given = ("table", table, tmp_path / "out", "--columns", COLUMNS, "--pixel-size", PIXEL, "--interval", 30)
+    assert "every id occurs in one frame only: they number the rows" in refuse(capsys, *given)
+    linked = [f"{frame},{x},{x},20,0,4" for frame, x in places]
+    table.write_text("\n".join([",".join(COLUMN_NAMES), *linked]))
+    assert "No precision is given: 8e-06 m is assumed, 0.001 of a mean diameter" in import_files(capsys, *given)
+    given = (*given[:2], tmp_path / "stated", *given[3:])
+    assert "No precision is given" not in import_files(capsys, *given, "--precision", 0.01)
+
+
 @pytest.mark.parametrize(
     ("separator", "start", "end", "decimal"),
     [(",", "", "\n", "."), (";", "\ufeff", "\r\n", "."), ("\t", "", "\r\n", "."), (" ", "", "\n", "."),
