@@ -272,7 +272,7 @@ def _validate_rods(found: ValidationResult, experiment: Experiment) -> None:
     if count < FEW * expected:
         found.steps["rods"].add_warning(
             f"About {expected} rods fill the area of those found, but {count} are found: mark the others, or try "
-            "another channel, following by outline, or a range of radii."
+            "another channel, following by outline, a range of radii, or --region if circles lie on empty ground."
         )
     for sentence in describe_missed_rods(experiment, found.rods) if found.rods is not None else ():
         found.steps["rods"].add_warning(sentence)

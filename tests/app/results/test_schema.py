@@ -165,9 +165,19 @@ class WithDrift(FrameForces):
     wear: Annotated[Array | None, Quantity("wear of every contact", "m", "contact", since=2)] = None
 
 
+@pytest.fixture
+def with_drift(monkeypatch):
+    """The schema with the additional quantities, which is gathered once for each process."""
+    with monkeypatch.context() as patch:
+        patch.setitem(schema.PARTS, "frames", WithDrift)
+        schema.entries.cache_clear()
+        yield
+    schema.entries.cache_clear()
+
+
 @pytest.mark.thorough
-def test_a_declared_quantity_reaches_every_output(tmp_path, monkeypatch):
-    monkeypatch.setitem(schema.PARTS, "frames", WithDrift)
+@pytest.mark.usefixtures("with_drift")
+def test_a_declared_quantity_reaches_every_output(tmp_path):
     plain = make_full_results()
     values = {each.name: None for each in fields(FrameForces)}
     frames = [
