@@ -24,13 +24,22 @@ FEWEST_BARS = 2  # of a packing with open sides; with fewer the outermost rods a
 
 
 def find_frame(draft: Draft, image: Image, found: ValidationResult) -> tuple[int, int]:
-    """Write the bars around the rods, and the discs where they meet; return how many of each. One step of undo."""
-    lines = bars.find_walls(image, found)
+    """Write the bars around the rods, and the discs where they meet; return how many of each. One step of undo.
+
+    Where the picture ends within the packing there is no bar.
+    """
+    lines, rods = bars.find_walls(image, found), found.rods
+    assert rods is not None
+    named = [
+        (name, line)
+        for name, line in zip(bars.names_of(lines), lines, strict=True)
+        if not bars.bounds_picture(image, line, rods)
+    ]
     with draft.one_step("walls found"):
-        edits.set_walls(draft, found, list(zip(bars.names_of(lines), lines, strict=True)), "walls found")
+        edits.set_walls(draft, found, named, "walls found")
         barred = validate(draft)
         discs = find_discs(draft, image, barred)
-    return len(lines), discs
+    return len(named), discs
 
 
 def find_discs(draft: Draft, image: Image, found: ValidationResult) -> int:

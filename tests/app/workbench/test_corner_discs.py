@@ -174,6 +174,19 @@ def test_discs_are_looked_for_between_the_bars_just_found_and_take_the_circles_o
     assert (back["rods"]["id"], back["walls"]) == (rods["id"], [])
 
 
+def test_no_bar_is_found_where_the_picture_ends_within_the_packing(visitor, monkeypatch):
+    (series,) = visitor.request("home")["series"]
+    at = visitor.request("begin", **{key: series[key] for key in ("folder", "suffix", "name")})["at"]
+    visitor.request("set_scale", at=at, pixel_size=2.5e-4)
+    visitor.request("add_rod", at=at, x=100, y=200, radius=15.0)
+    beyond = [FRAME[0], FRAME[1], FRAME[2], FRAME[3] - (22.0, 0.0)]
+    monkeypatch.setattr(found_walls.bars, "find_walls", lambda image, found: beyond)
+    monkeypatch.setattr(found_walls.circles, "find_corners", lambda image, found: [])
+    described = visitor.request("find_walls", at=at)
+    assert described["bars"] == 3
+    assert [wall["name"] for wall in described["walls"]] == ["bottom", "right", "top"]
+
+
 def test_only_ends_of_two_bars_that_meet_hold_a_disc_without_a_name_in_the_table(framed, monkeypatch):
     visitor, at = framed
     found = validate(Draft(visitor.workbench.root / at))

@@ -93,7 +93,8 @@ MUTANTS = [
             "        discs = find_discs(draft, image, found)\n    return",
         ),
         ('with draft.one_step("walls found"):', "if True:"),
-        ("return len(lines), discs", "return discs, discs"),
+        ("return len(named), discs", "return discs, discs"),
+        ("if not bars.bounds_picture(image, line, rods)\n", "if True\n"),
         ("        add_discs(draft, found, discs)\n    return", "        pass\n    return"),
         (
             "on |= np.hypot(rods.x - disc.x, rods.y - disc.y) < disc.radius",

@@ -66,7 +66,7 @@ def find_walls(image: Image, found: ValidationResult) -> Array:
     return lines_to_corners(np.array(chosen))
 
 
-def bounds_picture(image: Image, line: Array, rods: Detection) -> bool:
+def bounds_picture(image: Image, line: Array, rods: Detection | GrainGuess) -> bool:
     """Whether the picture ends within the packing at a line, where no bar is seen.
 
     Parameters
@@ -74,8 +74,8 @@ def bounds_picture(image: Image, line: Array, rods: Detection) -> bool:
     image : (H, W)
     line : array (2, 2)
         Ends [px] of a line that has the packing on its left.
-    rods : Detection
-        With circles whose centres lie outside of the picture.
+    rods : Detection or GrainGuess
+        With circles whose centres lie outside of the picture, if they were kept.
 
     Returns
     -------
