@@ -108,8 +108,7 @@ def bound_correlation(evidence: Evidence) -> float:
     of r, and T is multiplied by x_0/x. Without a load arctanh T is lower by 8 (1/n − 1/80) with n < 80 interior grains.
     Of soft grains T is at least the `confirmed_correlation`.
     """
-    bound = _as_with_a_load(_bound_by_table(evidence), bound_correlation, evidence)
-    return max(_beside_few(bound, evidence), confirmed_correlation(evidence))
+    return max(_beside_few(_limited_bound(evidence), evidence), confirmed_correlation(evidence))
 
 
 def predict_correlation(evidence: Sequence[Evidence], *, contradicted: bool = False) -> tuple[float, float, float]:
@@ -181,8 +180,8 @@ def losses(evidence: Evidence) -> dict[str, float]:
         loaded = _losses(replace(evidence, loaded=True))
         own = {name: max(own.get(name, 0.0), loaded.get(name, 0.0)) for name in {**own, **loaded}}
     if "few_interior" in own:
-        alone = _as_with_a_load(_bound_by_table(evidence), bound_correlation, evidence)
-        own["few_interior"] += alone - _beside_few(alone, evidence)
+        bound = _limited_bound(evidence)
+        own["few_interior"] += bound - _beside_few(bound, evidence)
     return own
 
 
@@ -205,7 +204,7 @@ def _losses(evidence: Evidence) -> dict[str, float]:
 
 def _as_with_a_load(found: float, measure: Callable[[Evidence], float], evidence: Evidence) -> float:
     """Limit a correlation to what the same evidence would mean under a known load, which can only add knowledge."""
-    if _table(evidence) is not FITTED["expected_correlation"]["unloaded"]:
+    if not _is_unloaded(evidence):
         return found
     loaded = min(measure(replace(evidence, loaded=True)), CERTAIN)
     return min(found, math.tanh(math.atanh(loaded) + UNLOADED_GAIN))
@@ -213,7 +212,7 @@ def _as_with_a_load(found: float, measure: Callable[[Evidence], float], evidence
 
 def _beside_few(bound: float, evidence: Evidence) -> float:
     """Lower the bound without a known load for the scatter of few interior grains."""
-    if _table(evidence) is not FITTED["expected_correlation"]["unloaded"]:
+    if not _is_unloaded(evidence):
         return bound
     few = max(1.0 / max(evidence.interior, 1.0) - 1.0 / MANY_INTERIOR, 0.0)
     return max(math.tanh(math.atanh(min(bound, CERTAIN)) - FEW_INTERIOR_MARGIN * few), 0.0)
@@ -221,8 +220,12 @@ def _beside_few(bound: float, evidence: Evidence) -> float:
 
 def _is_limited(evidence: Evidence) -> bool:
     """Whether the trust is what it would be under a known load."""
-    alone = _bound_by_table(evidence)
-    return _as_with_a_load(alone, bound_correlation, evidence) < alone
+    return _limited_bound(evidence) < _bound_by_table(evidence)
+
+
+def _limited_bound(evidence: Evidence) -> float:
+    """Bound by the table of the evidence, at most what it would be under a load."""
+    return _as_with_a_load(_bound_by_table(evidence), bound_correlation, evidence)
 
 
 def _known_fraction(evidence: Evidence) -> float:
@@ -322,6 +325,11 @@ def _table(evidence: Evidence) -> dict[str, Any]:
     if math.isnan(evidence.agreement):
         return tables["motion"]
     return tables["both" if evidence.loaded else "unloaded"]
+
+
+def _is_unloaded(evidence: Evidence) -> bool:
+    """Whether the table of both estimates without a load counts."""
+    return _table(evidence) is FITTED["expected_correlation"]["unloaded"]
 
 
 def _terms(table: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:

@@ -31,9 +31,10 @@ def study_measured(request: StudyRequest) -> int:
     if is_pegs(folder):
         if not has_forces(folder):
             raise InputError(folder, "", "holds no measured forces to compare with: PeGS 2 writes Adjacency_list.txt")
+        folder = _solve(folder, quiet=request.quiet or request.as_json)
     elif folder.is_dir() and not (folder / "results.h5").exists():
         raise InputError(folder, "", f"is neither a run (results.h5) nor files of PeGS ({POSITIONS}, *{DISCS})")
-    run, results = load_run(_solve(folder, quiet=request.quiet or request.as_json) if is_pegs(folder) else folder)
+    run, results = load_run(folder)
     truth = load_truth(run, results)
     if truth is None or run.experiment.config.truth is None:
         raise InputError(run.experiment.file, "key truth", "is missing: there are no measured forces to compare with")

@@ -28,13 +28,7 @@ def find_frame(draft: Draft, image: Image, found: ValidationResult) -> tuple[int
 
     Where the picture ends within the packing there is no bar.
     """
-    lines, rods = bars.find_walls(image, found), found.rods
-    assert rods is not None
-    named = [
-        (name, line)
-        for name, line in zip(bars.names_of(lines), lines, strict=True)
-        if not bars.bounds_picture(image, line, rods)
-    ]
+    named, _ = bars.find_named(image, found)
     with draft.one_step("walls found"):
         edits.set_walls(draft, found, named, "walls found")
         barred = validate(draft)
@@ -66,7 +60,14 @@ def add_discs(draft: Draft, found: ValidationResult, discs: Sequence[circles.Cir
 
 
 def set_found_walls(
-    draft: Draft, first: Image, detection: Detection, radii: Sequence[float], *, loaded: bool, known: bool
+    draft: Draft,
+    first: Image,
+    detection: Detection,
+    circles_found: Detection,
+    radii: Sequence[float],
+    *,
+    loaded: bool,
+    known: bool,
 ) -> tuple[Detection, list[str]]:
     """Write the bars that are found around the rods.
 
@@ -77,7 +78,9 @@ def set_found_walls(
     first : (H, W)
         The first photograph.
     detection : Detection
-        Circles as they were found, with those whose centres lie outside of the picture.
+        These rods.
+    circles_found : Detection
+        With those whose centres lie outside of the picture.
     radii : sequence of float
         The known classes [m].
     loaded : bool
@@ -88,18 +91,14 @@ def set_found_walls(
     Returns
     -------
     tuple
-        The rods without circles outside of the picture or beyond the bars, and sentences on what was left out.
+        The rods without circles beyond the bars, and sentences on what was left out.
     """
     notes: list[str] = []
-    circles_found, detection = detection, edits.within_picture(detection, first)
     found = validate(draft)
-    lines = bars.find_walls(first, found)
-    named = list(zip(bars.names_of(lines), lines, strict=True))
-    shown = [not bars.bounds_picture(first, line, circles_found) for line in lines]
-    if not all(shown):
-        beyond = ", ".join(repr(name) for (name, _), here in zip(named, shown, strict=True) if not here)
-        named = [each for each, here in zip(named, shown, strict=True) if here]
-        notes.append(f"The packing goes on beyond the picture at {beyond}: no wall is there.")
+    named, beyond = bars.find_named(first, found, circles_found)
+    if beyond:
+        listed = ", ".join(map(repr, beyond))
+        notes.append(f"The packing goes on beyond the picture at {listed}: no wall is there.")
     if len(named) < FEWEST_BARS and not loaded:
         notes.append(f"The picture shows a part of the packing: {_impose_outer_rods(draft, found)}")
         return detection, notes

@@ -274,14 +274,16 @@ def _find_rods_and_walls(
 ) -> tuple[ValidationResult, Detection, list[str]]:
     """Set rods, walls and pressures; also return the rods, and sentences on what was left out."""
     notes: list[str] = []
-    edits.set_rods(draft, "rods", edits.as_guess(edits.within_picture(detection, first)), flags.radii)
+    circles_found, detection = detection, edits.within_picture(detection, first)
+    edits.set_rods(draft, "rods", edits.as_guess(detection), flags.radii)
     if flags.walls == NONE:
         if flags.pressure:
             raise InputError("--pressure", next(iter(flags.pressure)), "loads a wall, but there are none: --walls none")
     elif flags.walls == FOUND:
         detection, notes = set_found_walls(
-            draft, first, detection, flags.radii, loaded=bool(flags.pressure), known=flags.grains is not None
-        )
+            draft, first, detection, circles_found, flags.radii,
+            loaded=bool(flags.pressure), known=flags.grains is not None,
+        )  # fmt: skip
     else:
         source = Path(flags.walls)
         if not source.is_file():
@@ -295,7 +297,7 @@ def _find_rods_and_walls(
             there = ", ".join(found.walls.name)
             raise InputError("--pressure", f"{wall}={pressure:g}", f"there is no such wall; there are {there}")
         edits.set_plate(draft, found, wall, {"pressure": pressure})
-    return _without_errors(draft, *validate(draft).steps), edits.within_picture(detection, first), notes
+    return _without_errors(draft, *validate(draft).steps), detection, notes
 
 
 def _without_errors(draft: Draft, *steps: str) -> ValidationResult:

@@ -36,11 +36,12 @@ def _parts(name: str, one: Any, other: Any, rounding: float) -> list[str]:
     return [
         f"{name}.{key}"
         for key in a.keys() | b.keys()
-        if key not in a or key not in b or not _same(a[key], b[key], rounding)
+        if key not in a or key not in b or not same_values(a[key], b[key], rounding)
     ]
 
 
-def _same(one: np.ndarray, other: np.ndarray, rounding: float) -> bool:
+def same_values(one: np.ndarray, other: np.ndarray, rounding: float = 0.0) -> bool:
+    """Return whether two arrays have the same type and values, NaN included."""
     alike = one.dtype.kind == other.dtype.kind == "U" or one.dtype == other.dtype
     if alike and rounding and one.dtype.kind == "f":
         return one.shape == other.shape and np.allclose(one, other, rounding, rounding * _largest(one), equal_nan=True)

@@ -21,6 +21,7 @@ from rodsight.results.results import Results
 from rodsight.results.schema import entries
 from rodsight.results.summary import save_summary, summarize
 
+from tests.app.results.differences import same_values
 from tests.app.results.full_results import make_full_results
 from tests.golden.stored import SCHEMAS, unpack
 
@@ -108,14 +109,7 @@ def test_a_file_of_schema_2_keeps_its_values(file, tmp_path):
         then.visititems(lambda path, each: paths.append(path) if isinstance(each, h5py.Dataset) else None)
         values = {path: (then[path][()], now[renamed.get(path, path)][()]) for path in paths}
     assert len(values) > 150
-    assert [path for path, both in values.items() if not _same(*map(np.asarray, both))] == []
-
-
-def _same(one: np.ndarray, other: np.ndarray) -> bool:
-    """Return whether two stored values are the same, NaN included."""
-    if one.shape != other.shape:
-        return False
-    return bool(np.array_equal(one, other, equal_nan=one.dtype.kind == "f"))
+    assert [path for path, both in values.items() if not same_values(*map(np.asarray, both))] == []
 
 
 @pytest.fixture(scope="module")

@@ -94,7 +94,7 @@ MUTANTS = [
         ),
         ('with draft.one_step("walls found"):', "if True:"),
         ("return len(named), discs", "return discs, discs"),
-        ("if not bars.bounds_picture(image, line, rods)\n", "if True\n"),
+        ("bars.find_named(image, found)", "(list(zip(bars.NAMES, bars.find_walls(image, found))), [])"),
         ("        add_discs(draft, found, discs)\n    return", "        pass\n    return"),
         (
             "on |= np.hypot(rods.x - disc.x, rods.y - disc.y) < disc.radius",

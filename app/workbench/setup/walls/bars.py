@@ -66,6 +66,21 @@ def find_walls(image: Image, found: ValidationResult) -> Array:
     return lines_to_corners(np.array(chosen))
 
 
+def find_named(
+    image: Image, found: ValidationResult, rods: Detection | None = None
+) -> tuple[list[tuple[str, Array]], list[str]]:
+    """Find the bars around the rods by name, and the names of the sides where the picture ends within the packing.
+
+    rods: with circles whose centres lie outside of the picture; None: those of the table.
+    """
+    lines = find_walls(image, found)
+    shown = found.rods if rods is None else rods
+    assert shown is not None
+    named = list(zip(names_of(lines), lines, strict=True))
+    beyond = [name for name, line in named if bounds_picture(image, line, shown)]
+    return [(name, line) for name, line in named if name not in beyond], beyond
+
+
 def bounds_picture(image: Image, line: Array, rods: Detection | GrainGuess) -> bool:
     """Whether the picture ends within the packing at a line, where no bar is seen.
 
