@@ -80,7 +80,7 @@ MUTANTS = [
         ("return max(_beside_few(_limited_bound(evidence)", "return min(_beside_few(_limited_bound(evidence)"),
         ("- FEW_INTERIOR_MARGIN * few", "- 0.0 * few"),
         ("- 1.0 / MANY_INTERIOR, 0.0)", "- 0.0, 0.0)"),
-        ('own["few_interior"] += bound', 'own["few_interior"] += 2.0 * bound'),
+        ('own["few_interior"] += bound', 'own["few_interior"] -= bound'),
         ("lambda e: 1.0 - e.agreement", "lambda e: e.agreement"),
         ("return float(weaken(value, seen)) if name in BY_SLIDING else value", "return value"),
         ("np.where(np.greater(value, 0.0), strength * value, value)", "np.asarray(strength * value)"),
