@@ -140,3 +140,14 @@ def test_a_tilt_of_the_camera_matters_where_overlaps_are_forces() -> None:
     assert not hard.applied
     assert soft is not None
     assert soft.value[6:8] == pytest.approx([-0.001, 0.0], abs=3e-4)
+
+
+def test_a_lens_whose_axis_is_beside_the_middle_is_no_perspective() -> None:
+    position, size_class = lattice(7)
+    offset = (position - 0.5 * SIDE) / (0.5 * SIDE) - [0.25, -0.15]
+    seen = position + 0.5 * SIDE * 0.01 * np.sum(offset**2, axis=-1, keepdims=True) * offset
+    found = find_camera_distortion(seen, np.full(position.shape[1], R), size_class)
+    assert found is not None
+    assert found.applied
+    assert found.value[8:].all()
+    assert not found.value[[0, 1, 6, 7]].any()  # unknowns that the picture does not have would only add their errors
