@@ -26,13 +26,26 @@ from .close_photographs import choose_span, count_alike
 from .friction import measure_friction, measure_resisting, refine_wall_friction, tuned_radii, use_unstated
 from .outliers import remove_outliers, restore_exchanged_ids
 from .radii import calibrate_with_radii, correct_exchanged_sizes, use_size_classes
+from .rotations import correct_rotations
 from .short_gaps import interpolate_short_gaps
 from .soft_grain_errors import correct_soft_grains
 from .softness import assume_softness, find_softness
 from .unseen import add_unseen
 
 # Corrections that the first frame reports, in this order.
-REMARKS = ("outliers", "gaps", "camera", "noise", "span", "size_classes", "softness", "resistance", "sizes", "ids")
+REMARKS = (
+    "outliers",
+    "gaps",
+    "camera",
+    "noise",
+    "span",
+    "size_classes",
+    "softness",
+    "resistance",
+    "sizes",
+    "ids",
+    "rotations",
+)
 
 
 class CoordinationError(UndeterminedError):
@@ -63,10 +76,12 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     walls, settings = inputs.walls, inputs.settings
     given, id_remark = restore_exchanged_ids(inputs.tracks)
     walls, failed = complete_walls(given, walls)
-    given, size_remark = (given, "") if settings.calibration is None else correct_exchanged_sizes(given, walls)
+    nothing_seen, wrong_rotations, size_remark = len(failed) == given.frame_count, (), ""
+    if settings.calibration is not None and not nothing_seen:
+        given, wrong_rotations = correct_rotations(given, walls)
+        given, size_remark = correct_exchanged_sizes(given, walls)
     tracks, outlier_remark = remove_outliers(given, walls, inputs.placed)
     tracks, gap_remark = interpolate_short_gaps(tracks, walls)
-    nothing_seen = len(failed) == tracks.frame_count
     if nothing_seen:
         settings = replace(settings, boundary=None, calibration=None, coordination=None)
     overlap, as_given, hidden = settings.overlap_of(tracks.radius), settings.calibration is None, False
@@ -74,6 +89,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     material = inputs.material
     remarks = dict.fromkeys(REMARKS, "") | {
         "outliers": outlier_remark, "gaps": gap_remark, "sizes": size_remark, "ids": id_remark,
+        "rotations": "; ".join(filter(None, (each.describe() for each in wrong_rotations))),
     }  # fmt: skip
     if settings.calibration is not None:
         if settings.sequence.uses_positions:

@@ -34,10 +34,18 @@ CAUSES: dict[str, Cause] = {
         "more than they seem to",
         "give the tracks as measured: a run treats their noise itself",
     ),
-    "rotation_sign": Cause("rolling is taken for sliding", "give theta counter-clockwise with y up: change its sign"),
-    "rotation_in_degrees": Cause("rolling is taken for sliding", "give theta in radians"),
+    "rotation_sign": Cause(
+        "rolling is taken for sliding",
+        "a run changes the sign: give theta counter-clockwise with y up",
+        corrected=True,
+    ),
+    "rotation_in_degrees": Cause(
+        "rolling is taken for sliding", "a run converts them: give theta in radians", corrected=True
+    ),
     "rotation_zero": Cause(
-        "rolling is taken for sliding", "leave theta out where it was not measured: it is then unknown, not zero"
+        "rolling is taken for sliding",
+        "a run takes them for unknown: leave theta out where it was not measured",
+        corrected=True,
     ),
     "friction": Cause(
         "tangential forces are limited wrongly, and with them the normal forces",

@@ -21,8 +21,10 @@ from ...results.finding import Finding
 from ...results.results import Results
 from ...solver.assessment.intervals.wall_sensors import contradicting
 from ...solver.convex.friction_check import QUIET
+from ...tracks import Tracks, WallTracks
 from ..correction.correct_sequence import complete_walls, correct_sequence
 from ..correction.outliers import restore_exchanged_ids
+from ..correction.rotations import correct_rotations
 from ..inputs import Inputs
 from .causes import finding, name_once
 from .data_quality import measure_data_quality
@@ -39,7 +41,6 @@ from .direct_tests import (
 from .distortion import seeks_distortion, undistorted
 from .resistance import examine_resistance
 from .rivals import rivals_of
-from .rotation_tests import examine_rotations
 from .sections import examine_sections
 from .smoothed_tracks import examine_smoothing
 from .trial import TRIAL_PHOTOGRAPHS, Trial, select_window, solve_trial, trial_score
@@ -90,14 +91,17 @@ def diagnose(
         Empty where nothing contradicts the model.
     """
     restored, exchanged = restore_exchanged_ids(inputs.tracks)
-    inputs = replace(inputs, tracks=restored)
     names = [finding("exchanged_ids", exchanged)] if exchanged else []
     walls, failed = complete_walls(restored, inputs.walls)
     if len(failed) == restored.frame_count:
         return names
+    turned, rotations = _examine_rotations(inputs, restored, walls)
+    names += [each for each in rotations if each.corrected]
+    inputs = replace(inputs, tracks=turned)
     sought = not undisturbed and seeks_distortion(inputs, walls, failed)
     tracks, walls, camera = undistorted(inputs, walls, failed, camera=sought)
-    found = [*examine_rotations(tracks, walls), *examine_order(tracks), *examine_smoothing(inputs.tracks)]
+    found = [each for each in rotations if not each.corrected]
+    found += [*examine_order(tracks), *examine_smoothing(inputs.tracks)]
     found += examine_walls(tracks, walls) or examine_wall_times(tracks, walls) or examine_wall_places(tracks, walls)
     found += examine_sizes(tracks, walls) or examine_sections(tracks)
     found += examine_inertia(tracks, walls, inputs.material) + examine_load(tracks, walls, inputs.material)
@@ -115,6 +119,14 @@ def diagnose(
     if found:  # wrong radii look like a few jumps
         poses = [each for each in poses if each.cause != "outlier_tracks"]
     return name_once([*found, *names, *camera, *poses])
+
+
+def _examine_rotations(inputs: Inputs, tracks: Tracks, walls: WallTracks) -> tuple[Tracks, list[Finding]]:
+    """Return the tracks with the rotations that a run uses, and name what is wrong with the stated ones."""
+    corrected, wrong = correct_rotations(tracks, walls)
+    if inputs.settings.calibration is None:
+        return tracks, [finding(each.cause, each.evidence, corrected=False) for each in wrong]
+    return corrected, [finding(each.cause, each.evidence, corrected=each.corrected) for each in wrong]
 
 
 def _compare_rivals(

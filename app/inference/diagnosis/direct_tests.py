@@ -220,14 +220,8 @@ def _shear_rate(tracks: Tracks, k: int) -> float:
     both, time = tracks.present_in(k - 1) & tracks.present_in(k), float(tracks.time[k] - tracks.time[k - 1])
     if int(both.sum()) < 4 or not time > 0.0:
         return np.nan
-    gradient = step_gradient(tracks, k, both)
+    gradient = displacement_gradient(tracks.position[k - 1], tracks.position[k] - tracks.position[k - 1], both)
     return shear_strain(0.5 * (gradient + gradient.T)) / time
-
-
-def step_gradient(tracks: Tracks, k: int, both: NDArray[np.bool_]) -> Array:
-    """Displacement gradient (2, 2) of some rods (n,) from the photograph before to photograph k."""
-    moved = np.where(both[:, None], tracks.position[k] - tracks.position[k - 1], np.nan)
-    return displacement_gradient(tracks.position[k - 1], moved, both)
 
 
 def _distance(tracks: Tracks, k: int, other: int, *, repeated: bool = False) -> float:

@@ -203,8 +203,9 @@ def test_a_cause_that_two_tests_find_is_named_once_with_the_evidence_of_both():
 
 
 def test_forces_suffer_from_causes_that_neither_a_run_corrects_nor_single_frames_show():
-    found = [finding(each, "") for each in ("lens", "friction", "not_explained", "smoothed_tracks", "rotation_sign")]
-    assert [each.cause for each in uncorrected(found)] == ["friction", "rotation_sign"]
+    causes = ("lens", "friction", "not_explained", "smoothed_tracks", "inertia", "rotation_sign")
+    found = [finding(each, "") for each in causes]
+    assert [each.cause for each in uncorrected(found)] == ["friction", "inertia"]
     assert uncorrected([finding("friction", "", corrected=True), finding("lens", "", corrected=False)]) == [
         finding("lens", "", corrected=False)
     ]

@@ -4,9 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.inference.diagnosis.rotation_tests import SPAN_SIGMAS, _deformation, _span, examine_rotations
+from rodsight.inference.correction.rotations import (
+    CORRECTIONS,
+    SPAN_SIGMAS,
+    _deformation,
+    _Sliding,
+    _span,
+    correct_rotations,
+)
 
-from .test_direct_tests import FRAMES, NOISE, PITCH, SIDE, STEP, N, box, rolling_tracks
+from .diagnosis.test_direct_tests import FRAMES, NOISE, PITCH, SIDE, STEP, N, box, rolling_tracks
+
+DEGREE = np.rad2deg(1.0)
 
 
 def with_rolling(factor, step=STEP):
@@ -21,18 +30,55 @@ def with_rolling(factor, step=STEP):
     return replace(tracks, rotation=factor * expected)
 
 
+def causes(tracks):
+    """What is found wrong with the rotations, and corrected."""
+    _, found = correct_rotations(tracks, box())
+    assert all(each.corrected for each in found)
+    return [each.cause for each in found]
+
+
 @pytest.mark.parametrize(
-    ("factor", "cause"), [(1.0, None), (-1.0, "rotation_sign"), (57.3, "rotation_in_degrees"), (0.0, "rotation_zero")]
+    ("factor", "named"),
+    [
+        (1.0, []),
+        (-1.0, ["rotation_sign"]),
+        (DEGREE, ["rotation_in_degrees"]),
+        (-DEGREE, ["rotation_sign", "rotation_in_degrees"]),
+    ],
 )
-def test_wrong_rotations_are_recognised(factor, cause):
-    found = examine_rotations(with_rolling(factor), box())
-    assert [each.cause for each in found] == ([] if cause is None else [cause])
+def test_wrong_rotations_are_recognised_and_corrected(factor, named):
+    stated, true = with_rolling(factor), with_rolling(1.0)
+    corrected, found = correct_rotations(stated, box())
+    assert [each.cause for each in found] == named
+    np.testing.assert_allclose(corrected.rotation, true.rotation, rtol=1e-12)
+    assert [each.describe() for each in found] == [
+        f"rotations were taken to be {CORRECTIONS[each.cause][1]}, since {each.evidence}" for each in found
+    ]
+
+
+def test_rotations_that_are_zero_in_every_photograph_are_unknown():
+    corrected, (found,) = correct_rotations(with_rolling(0.0), box())
+    assert found.cause == "rotation_zero"
+    assert np.isnan(corrected.rotation).all()
+
+
+def test_rotations_with_which_neighbours_slide_no_less_are_named_but_not_corrected(monkeypatch):
+    one = np.ones(1)
+    assert _Sliding(one, -one).name("rotation_sign", "").corrected
+    assert not _Sliding(one, one).name("rotation_sign", "").corrected
+    assert not _Sliding(np.empty(0), np.empty(0)).name("rotation_sign", "").corrected
+    monkeypatch.setattr(_Sliding, "ratio", lambda sliding, cause: 1.0)
+    stated = with_rolling(-1.0)
+    corrected, (found,) = correct_rotations(stated, box())
+    assert found.cause == "rotation_sign"
+    assert found.describe() == ""
+    assert corrected is stated
 
 
 def test_rotations_that_noise_hides_from_one_photograph_to_the_next_are_compared_over_several():
     small = 3.0 * NOISE / PITCH
-    assert [each.cause for each in examine_rotations(with_rolling(-1.0, small), box())] == ["rotation_sign"]
-    assert examine_rotations(with_rolling(1.0, small), box()) == []
+    assert causes(with_rolling(-1.0, small)) == ["rotation_sign"]
+    assert causes(with_rolling(1.0, small)) == []
 
 
 def test_a_step_leads_over_the_fewest_photographs_that_move_the_rods_enough():
@@ -50,17 +96,16 @@ def test_rods_that_turn_with_the_packing_show_wrong_rotations(factor, cause):
     turn = np.moveaxis(np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]), 2, 0)
     noise = 1e-3 * np.random.default_rng(1).normal(size=(FRAMES, N))
     turned = replace(tracks, position=tracks.position @ turn, rotation=factor * (angle[:, None] + noise))
-    found = examine_rotations(turned, box())
-    assert [each.cause for each in found] == ([] if cause is None else [cause])
+    assert causes(turned) == ([] if cause is None else [cause])
 
 
 def test_unknown_and_unrelated_rotations_give_no_finding():
     tracks = rolling_tracks()
-    assert examine_rotations(replace(tracks, rotation=np.full((FRAMES, N), np.nan)), box()) == []
+    assert causes(replace(tracks, rotation=np.full((FRAMES, N), np.nan))) == []
     random = np.random.default_rng(5).normal(size=(FRAMES, N))
     usual = float(np.median(np.abs(np.diff(with_rolling(1.0).rotation, axis=0))))
-    assert examine_rotations(replace(tracks, rotation=10.0 * usual * random), box()) == []
-    (found,) = examine_rotations(replace(tracks, rotation=1e3 * usual * random), box())
+    assert causes(replace(tracks, rotation=10.0 * usual * random)) == []
+    _, (found,) = correct_rotations(replace(tracks, rotation=1e3 * usual * random), box())
     assert found.cause == "rotation_in_degrees"
     assert found.evidence.endswith("without relation to it")
 
@@ -72,5 +117,4 @@ def test_rods_that_turn_like_gears_are_not_given_in_degrees(factor, cause):
     row, column = np.divmod(np.arange(N), SIDE)
     usual = float(np.median(np.abs(np.diff(small.rotation, axis=0))))
     gears = 40.0 * usual * np.where((row + column) % 2, 1.0, -1.0) * np.arange(FRAMES)[:, None]
-    found = examine_rotations(replace(tracks, rotation=factor * (small.rotation + gears)), box())
-    assert [each.cause for each in found] == ([] if cause is None else [cause])
+    assert causes(replace(tracks, rotation=factor * (small.rotation + gears))) == ([] if cause is None else [cause])

@@ -1,20 +1,27 @@
-"""Tests of stated rotations, by those that rolling among the neighbours leads to expect."""
+"""Rotations of the wrong sense, in degrees, or zero for unknown: found by what rolling leads to expect, corrected."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...results.finding import Finding
 from ...solver.bodies.disc_pairs import find_disc_pairs
 from ...solver.bodies.grains import Array
+from ...solver.bodies.strain import displacement_gradient
 from ...solver.even_subset import even_subset
 from ...solver.inferred.unknown_rotations import fill_unknown_rotations
 from ...solver.statistics.agreement import pearson, ranks
 from ...tracks import Tracks, WallTracks
-from .causes import finding
-from .direct_tests import step_gradient
 
+# Causes, by their names in a diagnosis: the factor that corrects the rotations, and what is said of them.
+CORRECTIONS: Mapping[str, tuple[float, str]] = {
+    "rotation_sign": (-1.0, "clockwise"),
+    "rotation_in_degrees": (np.pi / 180.0, "in degrees"),
+    "rotation_zero": (np.nan, "unknown"),
+}
 AGREES = 0.15  # rank correlation of stated and inferred rotations beyond which they are the same, or opposite …
 SIGMAS = 5.0  # … and standard deviations of that of unrelated ones
 DEGREES = 10.0  # ratio of stated to inferred rotations: degrees are 57 times radians …
@@ -26,8 +33,44 @@ SPAN_SIGMAS = 15.0  # standard deviations of a position by which rods must move 
 ROTATING_POSES, FEWEST_STEPS = 6000, 4  # poses, and steps between photographs, whose rotations are compared
 
 
-def examine_rotations(tracks: Tracks, walls: WallTracks) -> list[Finding]:
-    """Compare stated rotations with those that rolling among the neighbours leads to expect.
+@dataclass(frozen=True, slots=True)
+class WrongRotations:
+    """What is wrong with the rotations."""
+
+    cause: str  # one of CORRECTIONS
+    evidence: str
+    corrected: bool  # False: neighbours slide no less with corrected ones
+
+    def describe(self) -> str:
+        """Say what was corrected; empty: nothing."""
+        _, words = CORRECTIONS[self.cause]
+        return f"rotations were taken to be {words}, since {self.evidence}" if self.corrected else ""
+
+
+def correct_rotations(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, tuple[WrongRotations, ...]]:
+    """Correct rotations that are stated in degrees, of the wrong sense, or as zero although they are unknown.
+
+    Returns
+    -------
+    Tracks
+    tuple of WrongRotations
+        Empty where rotations agree with rolling; two where degrees have the wrong sense.
+    """
+    found: tuple[WrongRotations, ...] = ()
+    for _ in CORRECTIONS:
+        wrong = _find_wrong(tracks, walls)
+        if wrong is None:
+            break
+        found = (*found, wrong)
+        if not wrong.corrected:
+            break
+        factor, _ = CORRECTIONS[wrong.cause]
+        tracks = replace(tracks, rotation=factor * tracks.rotation)
+    return tracks, found
+
+
+def _find_wrong(tracks: Tracks, walls: WallTracks) -> WrongRotations | None:
+    """Compare stated rotations with those that rolling among the neighbours leads to expect; None: nothing is wrong.
 
     Notes
     -----
@@ -45,9 +88,9 @@ def examine_rotations(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     stated = tracks.rotation[span:] - tracks.rotation[:-span]
     known = np.isfinite(stated)
     if not known.any():
-        return []
+        return None
     if not stated[known].any():
-        return [finding("rotation_zero", "no rod rotates in any photograph")]
+        return WrongRotations("rotation_zero", "no rod rotates in any photograph", corrected=True)
     apart = max((tracks.frame_count - 1) // span, 1)  # steps that do not overlap: their errors are independent
     steps = min(max(ROTATING_POSES // tracks.grain_count, FEWEST_STEPS), apart)
     chosen = even_subset(len(stated), steps)
@@ -58,43 +101,61 @@ def examine_rotations(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     rolling = float(np.median(np.abs(inferred))) if len(stated) else 0.0
     ratio = float(np.median(np.abs(stated))) / rolling if rolling > 0.0 else 0.0
     excess = f"rods rotate {ratio:.0f} times as much as rolling leads to expect"
-    if ratio > DEGREES and not _slides_little_in_degrees(tracks, chosen, span):
+    sliding = _Sliding.measure(tracks, chosen, span)
+    if ratio > DEGREES and not sliding.ratio("rotation_in_degrees") < FAR_LESS:
         ratio = 1.0
     if abs(rank) >= max(AGREES, SIGMAS / np.sqrt(max(len(stated), 1))):
         against = f"the rank correlation with the rotations expected from rolling is {rank:.2f}"
-        return _judge_rotations(rank, against, ratio, excess)
+        return _judge(sliding, rank, against, ratio, excess)
     slope, error = _slope_of_turning(tracks)
     if abs(slope) < max(TURNS, SIGMAS * error):
         unrelated = f"{excess}, without relation to it"
-        return [finding("rotation_in_degrees", unrelated)] if ratio > DEGREES_OF_NOISE else []
+        return sliding.name("rotation_in_degrees", unrelated) if ratio > DEGREES_OF_NOISE else None
     words = f"rods rotate on average by {slope:.1f} times the rotation of the packing"
-    return _judge_rotations(slope, words, slope, words)
+    return _judge(sliding, slope, words, slope, words)
 
 
-def _slides_little_in_degrees(tracks: Tracks, start: NDArray[np.intp], span: int) -> bool:
-    """Whether neighbours slide far less, by the median of |u_t|, if rotations from some photographs are degrees."""
-    sliding: list[tuple[Array, Array]] = []
-    for k in start.tolist():
-        rotated = tracks.rotation[k + span] - tracks.rotation[k]
-        rows = np.flatnonzero(tracks.present_in(k) & tracks.present_in(k + span) & np.isfinite(rotated))
-        position, radius = tracks.position[k, rows], tracks.radius[rows]
-        i, j = find_disc_pairs(position, radius, NEIGHBOURS * float(tracks.radius.mean())).T
-        apart, moved = position[j] - position[i], tracks.position[k + span, rows] - position
-        tangent = np.stack([-apart[:, 1], apart[:, 0]], axis=1) / np.linalg.norm(apart, axis=1)[:, None]
-        rolled = radius[i] * rotated[rows][i] + radius[j] * rotated[rows][j]
-        sliding.append((np.einsum("ij,ij->i", moved[j] - moved[i], tangent), rolled))
-    along, rolled = (np.concatenate(each) for each in zip(*sliding, strict=True))
-    if not len(along):
-        return False
-    in_degrees, as_stated = (float(np.median(np.abs(along - each))) for each in (np.deg2rad(rolled), rolled))
-    return in_degrees < FAR_LESS * as_stated
+@dataclass(frozen=True, slots=True)
+class _Sliding:
+    """Motion of neighbours along their surfaces, in several steps; q pairs."""
+
+    along: Array  # (q,) [m] by their centres
+    rolled: Array  # (q,) [m] by their rotations as stated, the amount that rolling without sliding would cancel
+
+    @classmethod
+    def measure(cls, tracks: Tracks, start: NDArray[np.intp], span: int) -> _Sliding:
+        """Measure the pairs of neighbours in steps from some photographs, each over `span` photographs."""
+        along: list[Array] = [np.empty(0)]
+        turned: list[Array] = [np.empty(0)]
+        for k in start.tolist():
+            rotated = tracks.rotation[k + span] - tracks.rotation[k]
+            rows = np.flatnonzero(tracks.present_in(k) & tracks.present_in(k + span) & np.isfinite(rotated))
+            position, radius = tracks.position[k, rows], tracks.radius[rows]
+            i, j = find_disc_pairs(position, radius, NEIGHBOURS * float(tracks.radius.mean())).T
+            apart, moved = position[j] - position[i], tracks.position[k + span, rows] - position
+            tangent = np.stack([-apart[:, 1], apart[:, 0]], axis=1) / np.linalg.norm(apart, axis=1)[:, None]
+            along.append(np.einsum("ij,ij->i", moved[j] - moved[i], tangent))
+            turned.append(radius[i] * rotated[rows][i] + radius[j] * rotated[rows][j])
+        return cls(np.concatenate(along), np.concatenate(turned))
+
+    def ratio(self, cause: str) -> float:
+        """Median |u_t| with corrected rotations over that with the stated ones; infinite without neighbours."""
+        if not len(self.along):
+            return np.inf
+        factor, _ = CORRECTIONS[cause]
+        corrected, stated = (float(np.median(np.abs(self.along - each * self.rolled))) for each in (factor, 1.0))
+        return corrected / stated if stated > 0.0 else np.inf
+
+    def name(self, cause: str, evidence: str) -> WrongRotations:
+        """Name what is wrong, which is corrected where neighbours then slide less."""
+        return WrongRotations(cause, evidence, corrected=self.ratio(cause) < 1.0)
 
 
-def _judge_rotations(sense: float, against: str, ratio: float, excess: str) -> list[Finding]:
+def _judge(sliding: _Sliding, sense: float, against: str, ratio: float, excess: str) -> WrongRotations | None:
     """Name rotations of the wrong sense, negative, or those that are too large by a ratio, with their evidence."""
     if sense < 0:
-        return [finding("rotation_sign", against)]
-    return [finding("rotation_in_degrees", excess)] if ratio > DEGREES else []
+        return sliding.name("rotation_sign", against)
+    return sliding.name("rotation_in_degrees", excess) if ratio > DEGREES else None
 
 
 def _slope_of_turning(tracks: Tracks) -> tuple[float, float]:
@@ -105,7 +166,7 @@ def _slope_of_turning(tracks: Tracks) -> tuple[float, float]:
         both = tracks.present_in(k - 1) & tracks.present_in(k) & np.isfinite(rotated)
         if both.sum() < FEWEST_TURNING:
             continue
-        gradient = step_gradient(tracks, k, both)
+        gradient = displacement_gradient(tracks.position[k - 1], tracks.position[k] - tracks.position[k - 1], both)
         spin.append(0.5 * float(gradient[1, 0] - gradient[0, 1]))
         mean.append(float(rotated[both].mean()))
         error.append(float(rotated[both].std()) / np.sqrt(both.sum()))
