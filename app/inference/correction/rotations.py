@@ -16,7 +16,7 @@ from ...solver.inferred.unknown_rotations import fill_unknown_rotations
 from ...solver.statistics.agreement import pearson, ranks
 from ...tracks import Tracks, WallTracks
 
-# Causes, by their names in a diagnosis: the factor that corrects the rotations, and what is said of them.
+# Causes, by their names in a diagnosis: the factor that corrects the rotations, and how a correction is described.
 CORRECTIONS: Mapping[str, tuple[float, str]] = {
     "rotation_sign": (-1.0, "clockwise"),
     "rotation_in_degrees": (np.pi / 180.0, "in degrees"),
@@ -42,7 +42,7 @@ class WrongRotations:
     corrected: bool  # False: neighbours slide no less with corrected ones
 
     def describe(self) -> str:
-        """Say what was corrected; empty: nothing."""
+        """Describe the correction; empty: none."""
         _, words = CORRECTIONS[self.cause]
         return f"rotations were taken to be {words}, since {self.evidence}" if self.corrected else ""
 
