@@ -24,12 +24,13 @@ from .boundary import correct_camera, correct_walls, measure_noise
 from .calibration import calibrate_tracks, known_radii, own_gap_error, radius_classes
 from .close_photographs import choose_span, count_alike
 from .friction import measure_friction, measure_resisting, refine_wall_friction, tuned_radii, use_unstated
-from .outliers import remove_outliers, restore_exchanged_ids
 from .radii import calibrate_with_radii, correct_exchanged_sizes, use_size_classes
-from .rotations import correct_rotations
-from .short_gaps import interpolate_short_gaps
 from .soft_grain_errors import correct_soft_grains
 from .softness import assume_softness, find_softness
+from .tables.outliers import remove_outliers, restore_exchanged_ids
+from .tables.rotations import correct_rotations
+from .tables.short_gaps import interpolate_short_gaps
+from .tables.wall_times import correct_wall_times
 from .unseen import add_unseen
 
 # Corrections that the first frame reports, in this order.
@@ -73,24 +74,15 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     UndeterminedError
         A requested friction coefficient or coordination number cannot be determined.
     """
-    walls, settings = inputs.walls, inputs.settings
-    given, id_remark = restore_exchanged_ids(inputs.tracks)
-    walls, failed = complete_walls(given, walls)
-    nothing_seen, wrong_rotations, size_remark = len(failed) == given.frame_count, (), ""
-    if settings.calibration is not None and not nothing_seen:
-        given, wrong_rotations = correct_rotations(given, walls)
-        given, size_remark = correct_exchanged_sizes(given, walls)
-    tracks, outlier_remark = remove_outliers(given, walls, inputs.placed)
-    tracks, gap_remark = interpolate_short_gaps(tracks, walls)
+    settings = inputs.settings
+    tracks, walls, failed, from_tables = _correct_tables(inputs)
+    given_radius, nothing_seen = tracks.radius, len(failed) == tracks.frame_count
     if nothing_seen:
         settings = replace(settings, boundary=None, calibration=None, coordination=None)
     overlap, as_given, hidden = settings.overlap_of(tracks.radius), settings.calibration is None, False
     calibration = tuning = boundary = lens = None
     material = inputs.material
-    remarks = dict.fromkeys(REMARKS, "") | {
-        "outliers": outlier_remark, "gaps": gap_remark, "sizes": size_remark, "ids": id_remark,
-        "rotations": "; ".join(filter(None, (each.describe() for each in wrong_rotations))),
-    }  # fmt: skip
+    remarks = dict.fromkeys(REMARKS, "") | from_tables
     if settings.calibration is not None:
         if settings.sequence.uses_positions:
             material, remarks["softness"] = assume_softness(material, tracks, walls, failed)
@@ -114,14 +106,14 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         else:
             tracks, walls, calibration = calibrate_tracks(*observed)
         if calibration is not None:
-            corrected_gap = own_gap_error(calibration, radius_classes(given.radius))
+            corrected_gap = own_gap_error(calibration, radius_classes(given_radius))
             settings = replace(settings, sequence=replace(settings.sequence, corrected_gap=corrected_gap))
     if not nothing_seen:  # calibration has measured the noise that hides the sliding
         span, remarks["span"] = choose_span(tracks)
         alike = span if settings.sequence.soft else max(span, count_alike(tracks))
         settings = replace(settings, sequence=replace(settings.sequence, span=span, alike=alike))
     if settings.infer_unseen:
-        tracks = add_unseen(tracks, walls, known_radii(given.radius), settings.sequence.measured_overlap)
+        tracks = add_unseen(tracks, walls, known_radii(given_radius), settings.sequence.measured_overlap)
         sequence = replace(settings.sequence, unseen_sought=tracks.inferred is not None)
         settings = replace(settings, sequence=sequence)
         calibration = None if calibration is None else calibration.of_grains(tracks.grain_count)
@@ -144,9 +136,27 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         packing, tracks, walls, seen,
         settings.for_overlap(overlap), inputs.verdicts, calibration, tuning, boundary, failed,
         inputs.material.base_gravity, of_walls, inputs.material.friction_measured,
-        "; ".join(filter(None, remarks.values())), lens, bool(outlier_remark), hidden,
+        "; ".join(filter(None, remarks.values())), lens, bool(from_tables["outliers"]), hidden,
     )  # fmt: skip
     return corrected if as_given or nothing_seen or tuning is not None else correct_soft_grains(corrected)
+
+
+def _correct_tables(inputs: Inputs) -> tuple[Tracks, WallTracks, dict[int, str], dict[str, str]]:
+    """Correct what the tables of rods and walls confuse; also return unusable photographs, and what was done."""
+    tracks, ids = restore_exchanged_ids(inputs.tracks)
+    walls, failed = complete_walls(tracks, inputs.walls)
+    done = {"ids": ids}
+    if len(failed) < tracks.frame_count:
+        if inputs.settings.calibration is not None:
+            tracks, wrong = correct_rotations(tracks, walls)
+            done["rotations"] = "; ".join(filter(None, (each.describe() for each in wrong)))
+        if inputs.settings.boundary is not None:
+            walls, done["times"] = correct_wall_times(tracks, walls)
+        if inputs.settings.calibration is not None:
+            tracks, done["sizes"] = correct_exchanged_sizes(tracks, walls)
+    tracks, done["outliers"] = remove_outliers(tracks, walls, inputs.placed)
+    tracks, done["gaps"] = interpolate_short_gaps(tracks, walls)
+    return tracks, walls, failed, done
 
 
 def _pack(material: RodMaterial, tracks: Tracks, walls: WallTracks) -> Packing:

@@ -24,7 +24,7 @@ from ...solver.posterior.radius_posterior import RadiusPosterior, estimate_radii
 from ...tracks import Tracks, WallTracks
 from ..snapshots import grains_of, measure_sequence, pack_seen
 from .calibration import calibrate_tracks, radius_classes
-from .outliers import walls_in
+from .tables.outliers import walls_in
 
 NAMED = 8  # rods that a sentence lists
 SEED = 0  # of the draws: the same input gives the same bits

@@ -91,7 +91,9 @@ CAUSES: dict[str, Cause] = {
         "correct the ends of the wall",
     ),
     "walls_shifted": Cause(
-        "rods seem to penetrate walls or to leave them", "give the places of the walls at the times of the photographs"
+        "rods seem to penetrate walls or to leave them",
+        "a run uses the places at the other time: give the places of the walls at the times of the photographs",
+        corrected=True,
     ),
     "wall_at_rest": Cause(
         "rods seem to penetrate the wall or to leave it", "give the motion of the wall in every photograph"

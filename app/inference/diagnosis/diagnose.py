@@ -23,8 +23,9 @@ from ...solver.assessment.intervals.wall_sensors import contradicting
 from ...solver.convex.friction_check import QUIET
 from ...tracks import Tracks, WallTracks
 from ..correction.correct_sequence import complete_walls, correct_sequence
-from ..correction.outliers import restore_exchanged_ids
-from ..correction.rotations import correct_rotations
+from ..correction.tables.outliers import restore_exchanged_ids
+from ..correction.tables.rotations import correct_rotations
+from ..correction.tables.wall_times import correct_wall_times
 from ..inputs import Inputs
 from .causes import finding, name_once
 from .data_quality import measure_data_quality
@@ -44,7 +45,6 @@ from .rivals import rivals_of
 from .sections import examine_sections
 from .smoothed_tracks import examine_smoothing
 from .trial import TRIAL_PHOTOGRAPHS, Trial, select_window, solve_trial, trial_score
-from .wall_times import examine_wall_times
 
 # Rise of arctanh r that a rival must reach over the given input, and over all other causes. On correct input, and where
 # the model lacks physics that no rival has, the highest rise was 0.13 (seed 40, six scenarios).
@@ -98,11 +98,13 @@ def diagnose(
     turned, rotations = _examine_rotations(inputs, restored, walls)
     names += [each for each in rotations if each.corrected]
     inputs = replace(inputs, tracks=turned)
+    walls, late = correct_wall_times(turned, walls) if inputs.settings.boundary is not None else (walls, "")
+    names += [finding("walls_shifted", late, corrected=True)] if late else []
     sought = not undisturbed and seeks_distortion(inputs, walls, failed)
     tracks, walls, camera = undistorted(inputs, walls, failed, camera=sought)
     found = [each for each in rotations if not each.corrected]
     found += [*examine_order(tracks), *examine_smoothing(inputs.tracks)]
-    found += examine_walls(tracks, walls) or examine_wall_times(tracks, walls) or examine_wall_places(tracks, walls)
+    found += examine_walls(tracks, walls) or _examine_wall_times(tracks, walls) or examine_wall_places(tracks, walls)
     found += examine_sizes(tracks, walls) or examine_sections(tracks)
     found += examine_inertia(tracks, walls, inputs.material) + examine_load(tracks, walls, inputs.material)
     impossible = np.zeros(tracks.status.shape, np.bool_) if undisturbed else find_impossible_poses(tracks, walls)
@@ -127,6 +129,12 @@ def _examine_rotations(inputs: Inputs, tracks: Tracks, walls: WallTracks) -> tup
     if inputs.settings.calibration is None:
         return tracks, [finding(each.cause, each.evidence, corrected=False) for each in wrong]
     return corrected, [finding(each.cause, each.evidence, corrected=each.corrected) for each in wrong]
+
+
+def _examine_wall_times(tracks: Tracks, walls: WallTracks) -> list[Finding]:
+    """Name walls that are late as a run uses them."""
+    _, late = correct_wall_times(tracks, walls)
+    return [finding("walls_shifted", late, corrected=False)] if late else []
 
 
 def _compare_rivals(

@@ -17,11 +17,11 @@ from ...solver.bodies.wall_shapes import STRAIGHT, behind_body, outward_normals
 from ...solver.bodies.walls import Walls
 from ...solver.contacts.contacts import detect_contacts
 from ...tracks import Tracks, WallTracks
-from ..correction.outliers import find_outliers, walls_in
 from ..correction.radii import NAMED, find_oversized_rods, find_wrong_sizes
+from ..correction.tables.outliers import find_outliers, walls_in
+from ..correction.tables.wall_times import rods_beside
 from ..snapshots import grains_of
 from .causes import finding
-from .wall_times import rods_beside
 
 SHORTER = 0.75  # path through the photographs in another order over the given one, below which that order is right
 UNEVEN = 0.4  # standard deviation of the steps over their mean from which on another order is looked for …

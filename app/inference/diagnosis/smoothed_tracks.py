@@ -16,7 +16,7 @@ from ...solver.even_subset import even_subset
 from ...solver.frame_forces import FrameForces
 from ...solver.robust_scale import SD_OVER_MAD
 from ...tracks import Tracks, TrackStatus
-from ..correction.outliers import walls_in
+from ..correction.tables.outliers import walls_in
 from ..snapshots import grains_of
 from .causes import finding
 

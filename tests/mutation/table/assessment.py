@@ -9,7 +9,7 @@ MIXING = "tests/solver/mixture/test_field_mixing.py"
 MIXTURE_TRUST = (f"{TESTS}/test_mixture_trust.py", MIXING)
 FORCE_INTERVALS = f"{TESTS}/intervals/test_force_intervals.py"
 EXPECTED = f"{TESTS}/test_expected_correlation.py"
-OUTLIERS = "tests/app/inference/test_outliers.py"
+OUTLIERS = "tests/app/inference/tables/test_outliers.py"
 
 MUTANTS = [
     *mutants_of(
@@ -135,14 +135,14 @@ MUTANTS = [
         ("np.hypot(scale_sd, OF_WALL)", "scale_sd"),
     ),
     *mutants_of(
-        "app/inference/correction/outliers.py",
+        "app/inference/correction/tables/outliers.py",
         OUTLIERS,
         ("suspect[suspect.mean(axis=1) > MOST] = False", "pass"),
         ("MISPLACED = 0.25", "MISPLACED = 2.5"),
         ("certain = np.where((present & ~suspect)[..., None]", "certain = np.where(present[..., None]"),
     ),
     *mutants_of(
-        "app/inference/correction/outliers.py",
+        "app/inference/correction/tables/outliers.py",
         OUTLIERS,
         ("2.0 * position[k - 1] - position[k - 2]", "position[k - 1]"),
         ("< 2.0 * RETURN * deviation", "< np.inf"),

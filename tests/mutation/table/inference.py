@@ -4,7 +4,7 @@ from tests.mutation.mutant import mutants_of
 
 TESTS = "tests/app/inference"
 PREDICTION = "tests/app/study/test_predictions.py"
-OUTLIERS = f"{TESTS}/test_outliers.py"
+OUTLIERS = f"{TESTS}/tables/test_outliers.py"
 
 MUTANTS = [
     *mutants_of(
@@ -55,7 +55,7 @@ MUTANTS = [
         ("np.abs(step - np.median(step, axis=0)).max() < most", "np.abs(step - np.median(step, axis=0)).max() < 9.0"),
     ),
     *mutants_of(
-        "app/inference/correction/outliers.py",
+        "app/inference/correction/tables/outliers.py",
         OUTLIERS,
         ("if changed.any():\n            grains", "if True:\n            grains"),
         ("changed = (row[k] != row[k - 1]) & restored.present_in(k)", "changed = row[k] != row[k - 1]"),
@@ -72,8 +72,8 @@ MUTANTS = [
         ("np.cos(2.0 * between)", "np.cos(3.0 * between)"),
     ),
     *mutants_of(
-        "app/inference/diagnosis/wall_times.py",
-        f"{TESTS}/diagnosis/test_wall_times.py",
+        "app/inference/correction/tables/wall_times.py",
+        f"{TESTS}/tables/test_wall_times.py",
         ("in_time |= found.fraction(IN_TIME) > MOST", "in_time = True"),
         ("and found.fraction(best) > MOST", ""),
         ("ends = _at(walls.endpoints[:, w], k + LAGS[known])", "ends = _at(walls.endpoints[:, w], k - LAGS[known])"),
@@ -81,6 +81,9 @@ MUTANTS = [
         ("if abs(halves[0] - halves[1]) <= ALIKE else IN_TIME", "if False else IN_TIME"),
         ("    late.sort()\n", ""),
         ("np.diff([each.lag for each in late]) > ALIKE", "np.diff([each.lag for each in late]) > 9.0"),
+        ("_at(given, np.arange(len(given)) + lag)", "_at(given, np.arange(len(given)) - lag)"),
+        ("        if now > then:", "        if False:"),
+        ("np.clip(np.floor(time).astype(np.intp), 0,", "np.clip(np.floor(time).astype(np.intp), -5,"),
         ("if touch - moved <= SIGMAS * np.sqrt(touch):", "if False:"),
         ("if touch - moved <= SIGMAS * np.sqrt(touch):", "if True:"),
     ),
@@ -177,8 +180,8 @@ MUTANTS = [
         ("np.uint8(ContactSource.INTERPOLATED)", "np.uint8(ContactSource.DETECTED)"),
     ),
     *mutants_of(
-        "app/inference/correction/short_gaps.py",
-        f"{TESTS}/test_short_gaps.py",
+        "app/inference/correction/tables/short_gaps.py",
+        f"{TESTS}/tables/test_short_gaps.py",
         ("LONGEST = 2", "LONGEST = 3"),
         ("LONGEST if inside else 1", "LONGEST"),
         ("> MOST] = False", "> 1.0] = False"),
@@ -186,8 +189,8 @@ MUTANTS = [
         ("status[k, gaps[k]] = TrackStatus.INTERPOLATED", "pass"),
     ),
     *mutants_of(
-        "app/inference/correction/rotations.py",
-        f"{TESTS}/test_rotations.py",
+        "app/inference/correction/tables/rotations.py",
+        f"{TESTS}/tables/test_rotations.py",
         ("if sense < 0:", "if sense > 2:"),
         ("if ratio > DEGREES else None", "if ratio > 1e3 else None"),
         ("if ratio > DEGREES_OF_NOISE else None", "if False else None"),

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.inference.correction.outliers import find_outliers
 from rodsight.inference.correction.radii import find_oversized_rods, find_wrong_sizes
+from rodsight.inference.correction.tables.outliers import find_outliers
 from rodsight.inference.diagnosis.direct_tests import (
     examine_inertia,
     examine_load,

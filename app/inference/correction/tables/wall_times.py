@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...results.finding import Finding
-from ...solver.bodies.grains import Array
-from ...solver.bodies.wall_shapes import STRAIGHT, beside_wall, distance_from_walls, outward_normals
-from ...tracks import Tracks, WallTracks
-from .causes import finding
+from ....solver.bodies.grains import Array
+from ....solver.bodies.wall_shapes import STRAIGHT, beside_wall, distance_from_walls, outward_normals
+from ....tracks import Tracks, WallTracks
 
 LAGS = np.linspace(-1.5, 1.5, 31)  # [photographs] by which walls may be late
 IN_TIME = int(np.argmin(np.abs(LAGS)))
@@ -50,16 +49,23 @@ class _Late(NamedTuple):
     place: float  # [m] of that motion along its normal, of the end that moves most
 
 
-def examine_wall_times(tracks: Tracks, walls: WallTracks) -> list[Finding]:
-    """Look for straight walls that more rods touch if they are late or early by a part of a photograph.
+def correct_wall_times(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, str]:
+    """Move straight walls that more rods touch if they are late or early by a part of a photograph to their times.
+
+    Returns
+    -------
+    WallTracks
+        With the places at the times of the photographs.
+    str
+        A sentence on the correction; empty: none.
 
     Notes
     -----
     Between two photographs the wall moves on a straight path. Counted are rods whose gap is within three standard
     deviations of zero, for every lag; even and odd photographs must show the same lag by themselves. Wrong radii move
     the rods from all walls, or beyond all: some wall must be in time, or rods apart from one and beyond another. A wall
-    that moves steadily and is late looks like one that is misplaced: both are named unless clearly fewer rods touch it
-    in the other place.
+    that moves steadily and is late looks like one that is misplaced, with the same places after the correction: both
+    are named unless clearly fewer rods touch it in the other place.
     """
     late, in_time = [], False
     for w in np.flatnonzero(walls.sides == STRAIGHT).tolist():
@@ -70,12 +76,16 @@ def examine_wall_times(tracks: Tracks, walls: WallTracks) -> list[Finding]:
             count, apart = found.touching.sum(axis=0), bool(found.gap[:, number].sum() > 0.0)
             lag, counts = float(LAGS[number]), (int(count[number]), int(count[IN_TIME]))
             late.append(_Late(lag, walls.name[w], *counts, apart, *_misplaced(tracks, walls, w, lag)))
-    if not (in_time or len({each.apart for each in late}) == 2):
-        return []
+    if not late or not (in_time or len({each.apart for each in late}) == 2):
+        return walls, ""
+    endpoints = walls.endpoints.copy()
+    for each in late:
+        w = walls.name.index(each.name)
+        endpoints[:, w] = _move_in_time(tracks, walls.endpoints[:, w], each.lag)
     late.sort()
     groups = np.split(np.arange(len(late)), np.flatnonzero(np.diff([each.lag for each in late]) > ALIKE) + 1)
-    words = [_describe([late[each] for each in group]) for group in groups if len(group)]
-    return [finding("walls_shifted", "; ".join(words))] if words else []
+    words = [_describe([late[each] for each in group]) for group in groups]
+    return replace(walls, endpoints=endpoints), "; ".join(words)
 
 
 def count_touches(tracks: Tracks, walls: WallTracks, w: int) -> Touches:
@@ -137,6 +147,17 @@ def _misplaced(tracks: Tracks, walls: WallTracks, w: int, lag: float) -> tuple[i
     return count, float(np.abs(shift @ outward_normals(given.mean(axis=0))).max())
 
 
+def _move_in_time(tracks: Tracks, given: Array, lag: float) -> Array:
+    """Ends (f, 2, 2) of a wall (f, 2, 2) that is late; as given where more rods touch it there, as before it moves."""
+    moved = _at(given, np.arange(len(given)) + lag)
+    for k in range(len(given)):
+        here = rods_near(tracks, k, given[k])[0]
+        then, now = touching(tracks, k, here, np.stack([moved[k], given[k]])).sum(axis=1)
+        if now > then:
+            moved[k] = given[k]
+    return moved
+
+
 def _describe(walls: list[_Late]) -> str:
     """Describe walls that are late, or early, by the same time."""
     lag = float(np.mean([each.lag for each in walls]))
@@ -156,7 +177,7 @@ def _describe(walls: list[_Late]) -> str:
 
 
 def _at(endpoints: Array, time: Array) -> Array:
-    """Ends (t, 2, 2) of a wall (f, 2, 2) at times (t,) [photographs]."""
-    before = np.minimum(np.floor(time).astype(np.intp), len(endpoints) - 2)
+    """Ends (t, 2, 2) of a wall (f, 2, 2) at times (t,) [photographs], outside of the test by its motion at the end."""
+    before = np.clip(np.floor(time).astype(np.intp), 0, len(endpoints) - 2)
     part = (time - before)[:, None, None]
     return (1.0 - part) * endpoints[before] + part * endpoints[before + 1]

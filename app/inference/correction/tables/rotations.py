@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver.bodies.disc_pairs import find_disc_pairs
-from ...solver.bodies.grains import Array
-from ...solver.bodies.strain import displacement_gradient
-from ...solver.even_subset import even_subset
-from ...solver.inferred.unknown_rotations import fill_unknown_rotations
-from ...solver.statistics.agreement import pearson, ranks
-from ...tracks import Tracks, WallTracks
+from ....solver.bodies.disc_pairs import find_disc_pairs
+from ....solver.bodies.grains import Array
+from ....solver.bodies.strain import displacement_gradient
+from ....solver.even_subset import even_subset
+from ....solver.inferred.unknown_rotations import fill_unknown_rotations
+from ....solver.statistics.agreement import pearson, ranks
+from ....tracks import Tracks, WallTracks
 
 # Causes, by their names in a diagnosis: the factor that corrects the rotations, and how a correction is described.
 CORRECTIONS: Mapping[str, tuple[float, str]] = {

@@ -8,10 +8,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ...process.counts import state_count
-from ...solver.inferred.interpolated_poses import interpolate_poses, settle_poses
-from ...tracks import Tracks, TrackStatus, WallTracks
-from ..snapshots import grains_of
+from ....process.counts import state_count
+from ....solver.inferred.interpolated_poses import interpolate_poses, settle_poses
+from ....tracks import Tracks, TrackStatus, WallTracks
+from ...snapshots import grains_of
 from .outliers import walls_in
 
 LONGEST = 2  # photographs without a pose; neighbours rearrange over longer gaps

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...process.counts import state_count
-from ...solver.bodies.grains import Array
-from ...solver.bodies.walls import Walls
-from ...solver.contacts.contacts import Contacts, detect_contacts, measure_pairs
-from ...solver.inferred.exchanged_ids import find_exchanged_ids
-from ...solver.inferred.interpolated_poses import NEIGHBOURS, interpolate_poses, neighbour_rows
-from ...solver.robust_scale import SD_OVER_MAD
-from ...tracks import Tracks, TrackStatus, WallTracks
-from ..snapshots import grains_of
+from ....process.counts import state_count
+from ....solver.bodies.grains import Array
+from ....solver.bodies.walls import Walls
+from ....solver.contacts.contacts import Contacts, detect_contacts, measure_pairs
+from ....solver.inferred.exchanged_ids import find_exchanged_ids
+from ....solver.inferred.interpolated_poses import NEIGHBOURS, interpolate_poses, neighbour_rows
+from ....solver.robust_scale import SD_OVER_MAD
+from ....tracks import Tracks, TrackStatus, WallTracks
+from ...snapshots import grains_of
 
 JUMP = 6.0  # robust standard deviations of a rod's deviation from its neighbours beyond which it jumps …
 NOISE = 6.0  # … and standard deviations of a position

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.inference.correction.short_gaps import interpolate_short_gaps
+from rodsight.inference.correction.tables.short_gaps import interpolate_short_gaps
 from rodsight.inference.snapshots import make_snapshots, measure_sequence
 from rodsight.process.counts import state_count
 from rodsight.tracks import TrackStatus, WallTracks

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.inference.correction.outliers import (
+from rodsight.inference.correction.tables.outliers import (
     find_misplaced,
     find_outliers,
     remove_outliers,

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.inference.correction.rotations import (
+from rodsight.inference.correction.tables.rotations import (
     CORRECTIONS,
     SPAN_SIGMAS,
     _deformation,
@@ -13,7 +13,7 @@ from rodsight.inference.correction.rotations import (
     correct_rotations,
 )
 
-from .diagnosis.test_direct_tests import FRAMES, NOISE, PITCH, SIDE, STEP, N, box, rolling_tracks
+from ..diagnosis.test_direct_tests import FRAMES, NOISE, PITCH, SIDE, STEP, N, box, rolling_tracks
 
 DEGREE = np.rad2deg(1.0)
 
