@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -19,9 +20,10 @@ NEAR = 1.0  # mean radius up to which the gap of a rod is looked at
 SIGMAS = 3.0  # standard deviations of a position up to which a gap is that of a contact
 ROUGH = 2e-3  # mean radius, the same of rods whose radii are known no better
 # Times as many contacts as in time, fraction of the rods near the wall, and contacts, from which a wall is late. Of
-# simulated walls in time, .55 to .85 of the rods near them touch, of those that are late as well; with wrong radii or a
-# wrong camera at most .45 touch at any time.
-MORE, MOST, FEWEST = 2.0, 0.5, 20
+# simulated walls in time, .55 to .85 of the rods near them touch, of those that are late .39 to .7; with wrong radii or
+# a wrong camera at most .45 touch at any time, and 2.4 times as many at a wall that soft rods overlap.
+MORE, MOST, FEWEST = 4.0, 0.45, 20
+MORE_TOGETHER, FEWEST_TOGETHER = 2.0, 8  # of a wall that shares its lag with one that is late by these
 ALIKE = 0.2  # [photographs] by which the lags of two halves of the photographs, or of several walls, may differ
 
 
@@ -67,15 +69,13 @@ def correct_wall_times(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, s
     that moves steadily and is late looks like one that is misplaced, with the same places after the correction: both
     are named unless clearly fewer rods touch it in the other place.
     """
-    late, in_time = [], False
-    for w in np.flatnonzero(walls.sides == STRAIGHT).tolist():
-        found = count_touches(tracks, walls, w)
-        in_time |= found.fraction(IN_TIME) > MOST
-        number = find_lag(found)
-        if number != IN_TIME:
-            count, apart = found.touching.sum(axis=0), bool(found.gap[:, number].sum() > 0.0)
-            lag, counts = float(LAGS[number]), (int(count[number]), int(count[IN_TIME]))
-            late.append(_Late(lag, walls.name[w], *counts, apart, *_misplaced(tracks, walls, w, lag)))
+    found = {w: count_touches(tracks, walls, w) for w in np.flatnonzero(walls.sides == STRAIGHT).tolist()}
+    in_time = any(each.fraction(IN_TIME) > MOST for each in found.values())
+    late = []
+    for w, number in find_lags(found).items():
+        count, apart = found[w].touching.sum(axis=0), bool(found[w].gap[:, number].sum() > 0.0)
+        lag, counts = float(LAGS[number]), (int(count[number]), int(count[IN_TIME]))
+        late.append(_Late(lag, walls.name[w], *counts, apart, *_misplaced(tracks, walls, w, lag)))
     if not late or not (in_time or len({each.apart for each in late}) == 2):
         return walls, ""
     endpoints = walls.endpoints.copy()
@@ -123,11 +123,24 @@ def touching(tracks: Tracks, k: int, here: NDArray[np.intp], ends: Array) -> NDA
     return np.abs(gap) < width
 
 
-def find_lag(found: Touches) -> int:
+def find_lags(found: Mapping[int, Touches]) -> dict[int, int]:
+    """Numbers of the lags among LAGS of the walls that are late; fewer contacts show a lag that two walls share."""
+    certain = {w: number for w, each in found.items() if (number := _find_lag(each, MORE, FEWEST, MOST)) != IN_TIME}
+    shared = {
+        w: number
+        for w, each in found.items()
+        if w not in certain
+        and (number := _find_lag(each, MORE_TOGETHER, FEWEST_TOGETHER, 0.0)) != IN_TIME
+        and any(abs(LAGS[number] - LAGS[other]) <= ALIKE for other in certain.values())
+    }
+    return dict(sorted({**certain, **shared}.items()))
+
+
+def _find_lag(found: Touches, more: float, fewest: int, most: float) -> int:
     """Number of the lag of a wall among LAGS; IN_TIME also where it is not known."""
     count = found.touching.sum(axis=0)
     best = int(np.argmax(count))
-    enough = count[best] >= max(MORE * count[IN_TIME], FEWEST) and found.fraction(best) > MOST
+    enough = count[best] >= max(more * count[IN_TIME], fewest) and found.fraction(best) > most
     if not enough or abs(LAGS[best]) < LEAST_LAG:
         return IN_TIME
     halves = [float(LAGS[int(np.argmax(found.touching[start::2].sum(axis=0)))]) for start in (0, 1)]
@@ -149,7 +162,7 @@ def _misplaced(tracks: Tracks, walls: WallTracks, w: int, lag: float) -> tuple[i
 
 def _move_in_time(tracks: Tracks, given: Array, lag: float) -> Array:
     """Ends (f, 2, 2) of a wall (f, 2, 2) that is late; as given where more rods touch it there, as before it moves."""
-    moved = _at(given, np.arange(len(given)) + lag)
+    moved = _at(given, np.arange(len(given), dtype=np.float64) + lag)
     for k in range(len(given)):
         here = rods_near(tracks, k, given[k])[0]
         then, now = touching(tracks, k, here, np.stack([moved[k], given[k]])).sum(axis=1)

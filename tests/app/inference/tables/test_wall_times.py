@@ -57,6 +57,18 @@ def test_one_late_wall_is_named_alone(rising):
     assert found.startswith("wall 'top' is late by 0.5")
 
 
+def test_fewer_rods_show_a_lag_that_another_wall_shares(rising):
+    """Most rods at the bottom are apart from it, so that by itself it shows no lag."""
+    tracks, walls = rising
+    position = tracks.position.copy()
+    position[:, :6, 1] += NOISE * np.arange(10.0, 70.0, 10.0)
+    apart = replace(tracks, position=position)
+    _, found = correct_wall_times(apart, delayed(walls, 1.0))
+    assert found.startswith("walls 'bottom', 'top' are late by 1.0")
+    for unlike in (delayed(walls, 1.0, [0]), delayed(delayed(walls, 0.5, [0]), 1.0, [1])):
+        assert correct_wall_times(apart, unlike) == (unlike, "")
+
+
 def test_late_walls_are_grouped_by_their_time_whatever_their_order(rising):
     tracks, walls = rising
     bottom, top = walls.endpoints[:, 0], walls.endpoints[:, 1]
