@@ -22,14 +22,14 @@ from ..solver.bodies.grains import Array
 from ..solver.contacts.pairs import align
 from .files.writing import writing
 from .look import entities
-from .look.axes import Axes, round_step
+from .look.axes import Axes, log_scatter_axes, scatter
 from .look.canvas import Canvas
 from .look.clock import Clock
-from .look.colours import INK, SERIES, packed_one
+from .look.colours import SERIES
 from .look.force_style import ForceStyle
 from .look.printable_text import printable
 from .look.scene import Scene, tracks_in_cell
-from .look.values import log_scalar, nullable
+from .look.values import log_curve_style, log_scalar, nullable
 from .packing_layers.captions import log_caption
 from .packing_layers.forces.difference import log_difference, log_difference_legend
 from .packing_layers.forces.network import body_values
@@ -144,19 +144,10 @@ def _log_styles(stream: rr.RecordingStream, scene: Scene, comparison: Comparison
     hues, widths = (SERIES[0], SERIES[1], SERIES[0], SERIES[1]), (2.5, 2.5, 1.0, 1.0)
     curves += list(zip(ANGLES, names, hues, widths, strict=True))
     for path, name, colour, width in curves:
-        stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=width), static=True)
+        log_curve_style(stream, path, name, colour, width)
     reach = 1.15 * scene.style.range.top
     axes = Axes((0.0, reach), (0.0, reach), width=400.0, height=400.0)
-    step = round_step(reach / 2.5)
-    ticks = [(step * k, f"{step * k:g}") for k in range(int(reach / step) + 1)]
-    axes.log(
-        stream, SCATTER_AXES, SCATTER_TICKS, x_ticks=ticks, y_ticks=ticks,
-        notes=[
-            (0.8 * reach, 0.1 * reach, f"across: {second} [N]", INK),
-            (0.22 * reach, 0.97 * reach, f"up: {first} [N]", INK),
-        ],
-        guides=[axes.points(np.array([0.0, reach]), np.array([0.0, reach]))],
-    )  # fmt: skip
+    log_scatter_axes(stream, axes, SCATTER_AXES, SCATTER_TICKS, f"{second} [N]", f"{first} [N]")
     return axes
 
 
@@ -171,14 +162,7 @@ def _log_frame(clock: Clock, scene: Scene, comparison: Comparison, axes: Axes) -
     key, fn = _on_union(a, b, "fn")
     _, ft = _on_union(a, b, "ft")
     log_difference(clock, scene, DIFFERENCE, key, fn, ft)
-    reach = axes.x_range[1]
-    clock.log(
-        SCATTER,
-        rr.Points2D(
-            axes.points(np.minimum(fn[1], reach), np.minimum(fn[0], reach)),
-            radii=np.float32(2.5), colors=packed_one((*SERIES[0][:3], 200)), draw_order=20.0,
-        ),
-    )  # fmt: skip
+    clock.log(SCATTER, scatter(axes, fn[1], fn[0]))
     agreement = comparison.agreement[k]
     angles = (a.friction_angle, a.wall_ratio_angle, b.friction_angle, b.wall_ratio_angle)
     for path, value in (
@@ -193,12 +177,9 @@ def _log_network(clock: Clock, scene: Scene, path: str, field: FieldFrame) -> No
     contacts, fn, ft = field.contacts.select(shown), field.fn[shown], field.ft[shown]
     clock.log(
         path,
-        rr.LineStrips2D(
-            scene.branches(clock.frame, contacts), radii=scene.style.radii(fn), colors=scene.style.colours(fn),
-            draw_order=20.0,
-        ),
+        scene.style.strips(scene.branches(clock.frame, contacts), fn),
         rr.AnyValues(**body_values(scene, contacts), fn=nullable(fn), ft=nullable(ft)),
-    )  # fmt: skip
+    )
 
 
 def _on_union(a: FieldFrame, b: FieldFrame, name: str) -> tuple[NDArray[np.int64], Array]:

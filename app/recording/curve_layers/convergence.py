@@ -9,17 +9,17 @@ from ...solver.bodies.grains import Array
 from ...solver.frame_forces import FrameForces
 from ..look import entities
 from ..look.clock import Clock
-from ..look.colours import INK, SERIES, Rgba
-from ..look.values import log_scalar, send_scalars
+from ..look.colours import INK, SERIES
+from ..look.values import log_curve_style, log_scalar, send_scalars
 
 SMALLEST = 1e-16  # smaller residuals are drawn here: rounding level
 
 
 def log_residual_styles(stream: rr.RecordingStream) -> None:
     """Log names and colours of the residual curves."""
-    _log_style(stream, entities.SWEEP_NATURAL_MAP, "natural map", SERIES[0], 1.5)
-    _log_style(stream, entities.SWEEP_UNBALANCE, "worst unbalance / mean f_n", SERIES[1], 1.5)
-    _log_style(stream, entities.SWEEP_FORCE_CHANGE, "greatest |Δf|/|f| of a contact", SERIES[3], 1.0)
+    log_curve_style(stream, entities.SWEEP_NATURAL_MAP, "natural map", SERIES[0], 1.5)
+    log_curve_style(stream, entities.SWEEP_UNBALANCE, "worst unbalance / mean f_n", SERIES[1], 1.5)
+    log_curve_style(stream, entities.SWEEP_FORCE_CHANGE, "greatest |Δf|/|f| of a contact", SERIES[3], 1.0)
 
 
 def log_tolerance(clock: Clock, tolerance: float) -> None:
@@ -30,7 +30,7 @@ def log_tolerance(clock: Clock, tolerance: float) -> None:
 
 def log_tolerance_style(stream: rr.RecordingStream) -> None:
     """Log name and colour of the stopping level."""
-    _log_style(stream, entities.TOLERANCE, "stopping level", INK, 1.0)
+    log_curve_style(stream, entities.TOLERANCE, "stopping level", INK, 1.0)
 
 
 def log_residuals(clock: Clock, forces: FrameForces) -> None:
@@ -57,7 +57,3 @@ def power_of_ten(residual: Array) -> Array:
     """Return log10 of residuals, at least that of SMALLEST; NaN stays NaN, infinity becomes NaN."""
     residual = np.where(np.isinf(residual), np.nan, residual)
     return np.log10(np.maximum(residual, SMALLEST))
-
-
-def _log_style(stream: rr.RecordingStream, path: str, name: str, colour: Rgba, width: float) -> None:
-    stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=width), static=True)

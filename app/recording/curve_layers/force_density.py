@@ -11,7 +11,8 @@ from ...solver.statistics.force_statistics import mean_normal_force
 from ..look import entities
 from ..look.axes import Axes, log_texts
 from ..look.clock import Clock
-from ..look.colours import INK, SERIES, packed_one
+from ..look.colours import INK, SERIES
+from ..look.values import dots, strips
 
 LARGEST = 8.0  # f_n / ⟨f_n⟩ at the right end of the axis
 BINS = 32
@@ -53,38 +54,25 @@ class ForceDensity:
         clock.end()
         clock.log(
             entities.FORCE_DENSITY,
-            rr.Points2D(
-                density_points(*merge_bins(counts, 1), len(loaded)),
-                radii=np.float32(4.0),
-                colors=packed_one(SERIES[0]),
-                draw_order=20.0,
-            ),
+            dots(density_points(*merge_bins(counts, 1), len(loaded)), 4.0, SERIES[0], 20.0),
         )
         clock.log(
             entities.FORCE_DENSITY_POOLED,
-            rr.LineStrips2D(
-                [density_points(*merge_bins(self._pooled), self._total)],
-                radii=np.float32(1.6),
-                colors=packed_one(SERIES[1]),
-                draw_order=10.0,
-            ),
+            strips([density_points(*merge_bins(self._pooled), self._total)], 1.6, SERIES[1], 10.0),
         )
         self._log_tail(clock, loaded / mean_normal_force(fn) if len(loaded) else loaded, tail_exponent)
 
     def _log_tail(self, clock: Clock, ratio: Array, exponent: float) -> None:
         """Log the density S β exp(−β (x − 1)) above the mean; S is the fraction of the forces (c,) above it."""
-        strips, texts = [], []
+        lines, texts = [], []
         above = float(np.mean(ratio > 1.0)) if len(ratio) else 0.0
         if np.isfinite(exponent) and exponent > 0.0 and above > 0.0:
             x = np.linspace(1.0, LARGEST, 29)
             power = np.log10(above * exponent) - exponent * (x - 1.0) * np.log10(np.e)
             shown = power >= DECADES[0]
-            strips = [AXES.points(x[shown], power[shown])]
+            lines = [AXES.points(x[shown], power[shown])]
             texts = [(AXES.points(np.array(6.2), np.array(-0.5)), f"its tail exp(−{exponent:.2f} x)", SERIES[0])]
-        clock.log(
-            entities.FORCE_DENSITY_TAIL,
-            rr.LineStrips2D(strips, radii=np.float32(0.9), colors=packed_one(SERIES[0]), draw_order=15.0),
-        )
+        clock.log(entities.FORCE_DENSITY_TAIL, strips(lines, 0.9, SERIES[0], 15.0))
         log_texts(clock, entities.FORCE_DENSITY_TAIL_VALUE, texts, static=False)
 
 

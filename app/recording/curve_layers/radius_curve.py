@@ -7,8 +7,9 @@ import rerun as rr
 
 from ...solver.contacts.radius_tuning import RadiusTuning
 from ..look import entities
-from ..look.axes import Axes, round_step
-from ..look.colours import INK, SERIES, packed_one
+from ..look.axes import Axes, round_ticks
+from ..look.colours import INK, SERIES
+from ..look.values import dots, strips
 
 WIDTH, HEIGHT = 400.0, 480.0  # of the plot, in units of its view
 RADIUS_BOUNDS = ((-60.0, WIDTH + 25.0), (-15.0, HEIGHT + 45.0))  # of a view with its labels
@@ -30,25 +31,9 @@ def log_radius_curve(stream: rr.RecordingStream, tuning: RadiusTuning) -> None:
         label = f"z = {tuning.reached:.2f} at {1e6 * tuning.found:+.1f} µm"
         notes += [(axes.x_range[0] + 0.25 * span, high + 1.9 * margin, label, SERIES[2])]
     axes.log(
-        stream, entities.RADIUS_AXES, entities.RADIUS_TICKS, x_ticks=_ticks(axes.x_range, span),
-        y_ticks=_ticks(axes.y_range, axes.y_range[1] - axes.y_range[0]), notes=notes, guides=[wanted],
+        stream, entities.RADIUS_AXES, entities.RADIUS_TICKS, x_ticks=round_ticks(*axes.x_range, 4.0),
+        y_ticks=round_ticks(*axes.y_range, 4.0), notes=notes, guides=[wanted],
     )  # fmt: skip
-    stream.log(
-        entities.RADIUS_CURVE,
-        rr.LineStrips2D(
-            [axes.points(change, number)], radii=np.float32(1.6), colors=packed_one(SERIES[0]), draw_order=10.0
-        ),
-        static=True,
-    )
+    stream.log(entities.RADIUS_CURVE, strips([axes.points(change, number)], 1.6, SERIES[0], 10.0), static=True)
     found = axes.points(np.array([1e6 * tuning.found]), np.array([tuning.reached])) if tuning.met else []
-    stream.log(
-        entities.RADIUS_FOUND,
-        rr.Points2D(found, radii=np.float32(6.0), colors=packed_one(SERIES[2]), draw_order=20.0),
-        static=True,
-    )
-
-
-def _ticks(ends: tuple[float, float], span: float) -> list[tuple[float, str]]:
-    step = round_step(span / 4.0)
-    first, last = int(np.ceil(ends[0] / step)), int(np.floor(ends[1] / step))
-    return [(step * k, f"{step * k:g}".replace("-", "−")) for k in range(first, last + 1)]
+    stream.log(entities.RADIUS_FOUND, dots(found, 6.0, SERIES[2], 20.0), static=True)

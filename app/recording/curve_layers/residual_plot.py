@@ -21,6 +21,7 @@ from ..look import entities
 from ..look.axes import Axes
 from ..look.clock import Clock
 from ..look.colours import INK, SERIES, Rgba, packed
+from ..look.values import dots, strips
 from ..packing_layers.residual_maps import changes_per_sweep
 
 DECADES = (-6.0, 2.0)  # log10 of a residual, bottom and top
@@ -61,18 +62,16 @@ class ResidualPlot:
         residuals = np.stack([history.natural_map, history.unbalance, mean_changes(history)])
         curves = [axes_points(axes, *envelope(each)) for each in residuals]
         known = np.isfinite(cold) & (cold > 0.0)
-        strips = [*curves, axes_points(axes, COLD_SWEEPS[known].astype(float), cold[known])]
-        shown = [len(strip) > 1 for strip in strips]
+        lines = [*curves, axes_points(axes, COLD_SWEEPS[known].astype(float), cold[known])]
+        shown = [len(line) > 1 for line in lines]
         clock.start()
         clock.log(
             entities.RESIDUAL_CURVES,
-            rr.LineStrips2D(
-                [strip for strip, keep in zip(strips, shown, strict=True) if keep],
-                radii=np.array([1.4, 1.0, 0.8, 1.2], np.float32)[shown],
-                colors=packed(np.array([*COLOURS, COLD], np.uint8)[shown]),
-                draw_order=10.0,
+            strips(
+                [line for line, keep in zip(lines, shown, strict=True) if keep], np.array([1.4, 1.0, 0.8, 1.2])[shown],
+                packed(np.array([*COLOURS, COLD], np.uint8)[shown]), 10.0,
             ),
-        )
+        )  # fmt: skip
         self._mark_reported(clock, axes, forces)
         self._mark(clock, axes, residuals, np.unique(np.clip(marked, 0, history.count - 1)))
 
@@ -81,10 +80,7 @@ class ResidualPlot:
         rows = at if len(at) and at[0] == 0 else np.concatenate([[0], at])
         places = [axes_points(axes, np.full(3, 1.0 + row), residuals[:, row], keep=True) for row in rows.tolist()]
         clock.start()
-        clock.log(
-            entities.RESIDUAL_MARKS,
-            rr.Points2D(places[0], radii=np.float32(4.5), colors=packed(np.array(COLOURS, np.uint8)), draw_order=20.0),
-        )
+        clock.log(entities.RESIDUAL_MARKS, dots(places[0], 4.5, packed(np.array(COLOURS, np.uint8)), 20.0))
         if len(rows) > 1:
             columns = rr.Points2D.columns(positions=np.concatenate(places[1:]))
             clock.send(entities.RESIDUAL_MARKS, clock.columns(rows[1:]), columns.partition(np.full(len(rows) - 1, 3)))

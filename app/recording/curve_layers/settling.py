@@ -1,4 +1,4 @@
-"""Writes the reliability of a frame: status lanes, trust, settling and flags."""
+"""Writes the reliability of a frame: status lanes, trust, settling, start residuals, counts of contacts and flags."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..look.clock import Clock
 from ..look.colours import BOUNDARY, INFERRED, INK, LOST, NEW_CONTACT, SERIES, Rgba
 from ..look.printable_text import printable
 from ..look.scene import Scene
-from ..look.values import log_scalar, log_scalars
+from ..look.values import log_curve_style, log_scalar, log_scalars
 from .convergence import power_of_ten
 
 # Distinguishable in every kind of colour vision; in grey settled frames are dark, frames that need attention bright.
@@ -30,6 +30,7 @@ STATUS_MARKS: dict[FrameStatus, str] = {
     FrameStatus.RESET: "0", FrameStatus.SUSPECT: "?", FrameStatus.REARRANGING: "≠", FrameStatus.SETTLING: "≈",
     FrameStatus.SETTLED: "=", FrameStatus.FAILED: "×",
 }  # fmt: skip
+AMBIGUOUS = 0.5  # P(touch) below which a contact is more probably open than closed
 LOW_TRUST = 0.9  # T below which its reasons are flagged
 # States of the tracking lane; of those that apply to a frame the first is shown.
 SOME_LOST, SOME_CUT, SOME_INFERRED = "grains lost", "grains beyond the border", "visible ones tracked, some inferred"
@@ -83,12 +84,18 @@ def log_settling_styles(stream: rr.RecordingStream) -> None:
         (entities.FINAL_UNBALANCE, "worst unbalance of the reported field", SERIES[3]),
         (entities.NEW_CONTACT_COUNT, "new", NEW_CONTACT),
         (entities.LOST_CONTACT_COUNT, "lost", LOST),
+        (entities.COLD_RESIDUAL, "cold: one sweep from zero forces", SERIES[1]),
+        (entities.WARM_RESIDUAL, "warm: one sweep from the former forces", SERIES[0]),
+        (entities.EXPECTED_COUNT, "expected: sum of P(touch)", SERIES[1]),
+        (entities.AMBIGUOUS_COUNT, "kept with P(touch) < 1/2", SERIES[3]),
     ):
-        stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=2.0), static=True)
+        log_curve_style(stream, path, name, colour)
 
 
 def log_settling(clock: Clock, scene: Scene, forces: FrameForces) -> None:
-    """Log lanes, trust and flags of one frame."""
+    """Log lanes, curves and flags of one frame."""
+    cold, probability = forces.cold_residual, forces.probability
+    computed = bool(np.isfinite(probability).any())
     clock.start()
     clock.log(entities.STATUS_LANE, rr.StateChange(state=forces.status.name.lower()))
     clock.log(entities.TRACKING_LANE, rr.StateChange(state=tracking_state(scene.tracks, clock.frame)))
@@ -106,6 +113,11 @@ def log_settling(clock: Clock, scene: Scene, forces: FrameForces) -> None:
         (entities.FINAL_UNBALANCE, power_of_ten(np.array(forces.unbalance))),
         (entities.NEW_CONTACT_COUNT, forces.new_contact_count),
         (entities.LOST_CONTACT_COUNT, forces.lost_contact_count),
+        (entities.COLD_RESIDUAL, power_of_ten(np.array(np.nan if cold is None else cold[0]))),
+        (entities.WARM_RESIDUAL, power_of_ten(np.array(forces.warm_residual))),
+        (entities.SAVED_SWEEPS, forces.sweeps_saved),
+        (entities.EXPECTED_COUNT, np.nansum(probability) if computed else np.nan),
+        (entities.AMBIGUOUS_COUNT, np.sum(probability < AMBIGUOUS) if computed else np.nan),
     ):
         log_scalar(clock, path, float(value))
     if forces.error_budget is not None:

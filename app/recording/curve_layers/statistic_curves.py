@@ -18,7 +18,7 @@ from ..look.clock import Clock
 from ..look.colours import MARKERS, SERIES, Marker, Rgba, style_of_series
 from ..look.printable_text import printable
 from ..look.scene import Scene
-from ..look.values import log_scalar, log_scalars
+from ..look.values import log_curve_style, log_scalar, log_scalars
 
 MARKER_SIZE = 4.5  # [px] of the viewer, half of it
 KEY_WIDTH, LETTER_WIDTH, KEY_MARGIN = 600.0, 8.0, 20.0  # of the key of walls: whole, of a letter, around a name
@@ -73,7 +73,7 @@ CURVES = (
 def log_statistics_styles(stream: rr.RecordingStream, scene: Scene) -> None:
     """Log names and colours of the curves."""
     for curve in CURVES:
-        stream.log(curve.path, rr.SeriesLines(colors=[curve.colour], names=curve.name, widths=2.0), static=True)
+        log_curve_style(stream, curve.path, curve.name, curve.colour)
         band = rr.SeriesLines(colors=[curve.colour] * 2, names=[curve.name] * 2, widths=[0.6] * 2)
         stream.log(curve.path + entities.BAND, band, static=True)
     walls = [printable(name) for name in scene.walls.name]

@@ -11,7 +11,8 @@ from ...solver.statistics.frame_statistics import FrameStatistics
 from ..look import entities
 from ..look.axes import log_cross_hairs, log_texts, polar
 from ..look.clock import Clock
-from ..look.colours import FAINT, INK, SERIES, packed, packed_one
+from ..look.colours import FAINT, INK, SERIES, packed
+from ..look.values import strips
 
 BINS = 36  # of contact directions, 10° each
 STRESS_REACH = 1.75  # of the views, in units of the circle
@@ -47,12 +48,7 @@ def log_stress(clock: Clock, statistics: FrameStatistics) -> None:
     tips = np.stack([axis[0], -axis[1]], axis=1) * (100.0 * ratio)[:, None]
     clock.log(
         entities.STRESS_CROSS,
-        rr.LineStrips2D(
-            np.stack([-tips, tips], axis=1).astype(np.float32),
-            radii=np.array([3.0, 2.0], np.float32),
-            colors=packed(np.array([SERIES[0], SERIES[1]], np.uint8)),
-            draw_order=20.0,
-        ),
+        strips(np.stack([-tips, tips], axis=1), [3.0, 2.0], packed(np.array(SERIES[:2], np.uint8)), 20.0),
     )
     angle = np.degrees(statistics.principal_direction)
     texts = [
@@ -63,10 +59,7 @@ def log_stress(clock: Clock, statistics: FrameStatistics) -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 97)
     normal = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     radius = np.einsum("ka,ab,kb->k", normal, stress, normal) / statistics.pressure
-    clock.log(
-        entities.STRESS_CURVE,
-        rr.LineStrips2D([polar(angle, radius)], radii=np.float32(0.9), colors=packed_one(INK), draw_order=10.0),
-    )
+    clock.log(entities.STRESS_CURVE, strips([polar(angle, radius)], 0.9, INK, 10.0))
 
 
 def log_rose(clock: Clock, forces: FrameForces) -> None:
@@ -83,13 +76,8 @@ def log_rose(clock: Clock, forces: FrameForces) -> None:
         (entities.ROSE, bearing, SERIES[1], 10.0),
         (entities.ROSE_OF_FORCES, bearing * fn, SERIES[0], 20.0),
     ):
-        strips = [rose_outline(direction_densities(normal, weight))] if len(fn) else []
-        clock.log(
-            path,
-            rr.LineStrips2D(
-                strips, radii=np.float32(1.3), colors=packed_one(colour if strips else FAINT), draw_order=order
-            ),
-        )
+        lines = [rose_outline(direction_densities(normal, weight))] if len(fn) else []
+        clock.log(path, strips(lines, 1.3, colour if lines else FAINT, order))
 
 
 def direction_densities(normal: Array, weight: Array) -> Array:

@@ -21,7 +21,6 @@ from ..curve_layers.force_density import ForceDensity
 from ..curve_layers.radius_curve import log_radius_curve
 from ..curve_layers.residual_plot import ResidualPlot
 from ..curve_layers.settling import log_settling, log_settling_styles
-from ..curve_layers.start_residuals import log_start_styles, log_starts
 from ..curve_layers.statistic_curves import log_statistics, log_statistics_styles
 from ..curve_layers.stress_and_fabric import log_polar_axes, log_rose, log_stress
 from ..look.clock import Clock
@@ -30,7 +29,6 @@ from ..look.printable_text import printable
 from ..look.scene import Scene
 from ..packing_layers.captions import log_caption, log_card
 from ..packing_layers.contact_changes import log_changes
-from ..packing_layers.contact_counts import log_contact_count_styles, log_contact_counts
 from ..packing_layers.film import FilmWriter
 from ..packing_layers.forces.force_uncertainty import log_force_uncertainty
 from ..packing_layers.forces.network import SweepChoice, chosen_sweeps, log_network
@@ -133,9 +131,7 @@ class Recorder:
         stream.send_recording_name(printable(scene.name))
         send_experiment(stream, scene)
         log_settling_styles(stream)
-        log_start_styles(stream)
         log_statistics_styles(stream, scene)
-        log_contact_count_styles(stream)
         log_polar_axes(stream)
         log_legends(stream, scene)
         self._density.log_axes(stream)
@@ -167,10 +163,8 @@ class Recorder:
         log_grains_and_walls(clock, scene, forces)
         self.network_rows += log_network(clock, scene, drawn, self._previous, self._sweeps, kept)
         log_force_uncertainty(clock, scene, drawn)
-        log_starts(clock, forces)
         self._log_solve(clock, scene, forces)
         log_residual_maps(clock, scene, forces, drawn, self._sweeps, kept)
-        log_contact_counts(clock, forces)
         log_verdicts(clock, scene, forces)
         log_changes(clock, scene, forces, self._previous, drawn.contacts)
         log_settling(clock, scene, forces)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from ...solver.bodies.grains import Array
 from .clock import Clock
-from .colours import FAINT, INK, Rgba, packed, packed_one
+from .colours import FAINT, INK, SERIES, Rgba, packed
+from .values import dots, strips
 
 WIDTH, HEIGHT = 600.0, 380.0  # of a plot, in units of its view
 PLOT_BOUNDS = ((-60.0, WIDTH + 25.0), (-15.0, HEIGHT + 45.0))  # of a view with its labels
@@ -63,12 +64,9 @@ class Axes:
         x0, x1, y0, y1 = *self.x_range, *self.y_range
         grid = [self.points(np.array([x, x]), np.array([y0, y1])) for x, _ in x_ticks]
         grid += [self.points(np.array([x0, x1]), np.array([y, y])) for y, _ in y_ticks]
-        strips = [*grid, *guides]
         shades = np.array([FAINT] * len(grid) + [INK] * len(guides), np.uint8)
         shades[: len(grid), 3] = 90
-        stream.log(
-            lines, rr.LineStrips2D(strips, radii=np.float32(0.6), colors=packed(shades), draw_order=0.0), static=True
-        )
+        stream.log(lines, strips([*grid, *guides], 0.6, packed(shades), 0.0), static=True)
         # The viewer places a text below its point.
         raised, left = 16.0 * (y1 - y0) / self.height, 22.0 * (x1 - x0) / self.width
         texts = [(x, y0, text, INK) for x, text in x_ticks]
@@ -108,10 +106,32 @@ def polar(angle: Array, radius: Array) -> NDArray[np.float32]:
 def log_cross_hairs(stream: rr.RecordingStream, path: str, reach: float) -> None:
     """Log the unit circle and the axes of a polar plot, static, up to `reach` in units of the circle."""
     arm = reach * CIRCLE
-    strips = [circle(), np.array([[-arm, 0], [arm, 0]]), np.array([[0, -arm], [0, arm]])]
-    stream.log(
-        path, rr.LineStrips2D(strips, radii=np.float32(0.5), colors=packed_one(FAINT), draw_order=0.0), static=True
-    )
+    lines = [circle(), np.array([[-arm, 0], [arm, 0]]), np.array([[0, -arm], [0, arm]])]
+    stream.log(path, strips(lines, 0.5, FAINT, 0.0), static=True)
+
+
+def log_scatter_axes(stream: rr.RecordingStream, axes: Axes, lines: str, ticks: str, across: str, up: str) -> None:
+    """Log axes of equal ranges from zero with the line of equality and their names, static."""
+    reach = axes.x_range[1]
+    values = round_ticks(0.0, reach, 2.5)
+    axes.log(
+        stream, lines, ticks, x_ticks=values, y_ticks=values,
+        notes=[(0.8 * reach, 0.1 * reach, f"across: {across}", INK), (0.24 * reach, 0.97 * reach, f"up: {up}", INK)],
+        guides=[axes.points(np.array([0.0, reach]), np.array([0.0, reach]))],
+    )  # fmt: skip
+
+
+def scatter(axes: Axes, x: Array, y: Array) -> rr.Points2D:
+    """Return a point for every pair of data coordinates, at most the greatest of the axis of x."""
+    reach = axes.x_range[1]
+    return dots(axes.points(np.minimum(x, reach), np.minimum(y, reach)), 2.5, (*SERIES[0][:3], 200), 20.0)
+
+
+def round_ticks(low: float, high: float, parts: float) -> list[tuple[float, str]]:
+    """Return round values between the ends of an axis in about so many parts, with their texts."""
+    step = round_step((high - low) / parts)
+    first, last = int(np.ceil(low / step)), int(np.floor(high / step))
+    return [(step * k, f"{step * k:g}".replace("-", "−")) for k in range(first, last + 1)]
 
 
 def round_step(size: float) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import rerun as rr
 from numpy.typing import NDArray
 
 from ...drawing.force_range import ForceRange
@@ -12,6 +13,7 @@ from ...drawing.ramps import FORCE_RAMP, RAMP_LEVELS
 from ...solver.bodies.grains import Array
 from .canvas import Canvas
 from .colours import OPEN, WEAK, packed, packed_one
+from .values import strips
 
 THINNEST = 0.022  # line radius over grain radius, of a contact without force
 THICKEST = 0.36  # of a contact at the top
@@ -45,6 +47,10 @@ class ForceStyle:
         level = np.round(self.range.fraction_of_ramp(fn) * (RAMP_LEVELS - 1)).astype(np.int64)
         colours = np.where(fn < self.range.weak, _WEAK, _RAMP[level])
         return np.where(fn <= 0.0, _OPEN, colours).astype(np.uint32)
+
+    def strips(self, lines: NDArray[np.floating], fn: Array, order: float = 20.0) -> rr.LineStrips2D:
+        """Return contacts (c, 2, 2) [px] as lines in the widths and colours of their forces [N]."""
+        return strips(lines, self.radii(fn), self.colours(fn), order)
 
     def clipped(self, fn: Array) -> int:
         """Return the number of forces above the top of the range."""

@@ -12,6 +12,7 @@ from ...solver.bodies.grains import Array
 from .axes import log_texts
 from .canvas import Canvas
 from .colours import INK, Rgba
+from .values import strips
 
 PIECES = 48
 TICKS_BELOW, NOTES_BELOW = 0.10, 0.42  # of the height of the legend, from its line to the texts
@@ -43,10 +44,7 @@ def log_ramp_legend(
     notes : sequence of (float, str, Rgba)
         Fraction of the length, text and colour, below the texts.
     """
-    strips = rr.LineStrips2D(
-        legend_pieces(canvas), radii=np.float32(0.22 * canvas.grain_radius), colors=colours, draw_order=50.0
-    )
-    stream.log(path, strips, static=True)
+    stream.log(path, strips(legend_pieces(canvas), 0.22 * canvas.grain_radius, colours, 50.0), static=True)
     log_legend_texts(stream, canvas, ticks, texts, notes)
 
 

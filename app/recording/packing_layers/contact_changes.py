@@ -12,9 +12,9 @@ from ...solver.contacts.pairs import are_among, are_present
 from ...solver.frame_forces import FrameForces
 from ..look import entities
 from ..look.clock import Clock
-from ..look.colours import GAP_RAMP, LOST, NEW_CONTACT, packed, packed_one
+from ..look.colours import GAP_RAMP, LOST, NEW_CONTACT, packed
 from ..look.scene import Scene
-from ..look.values import nullable
+from ..look.values import dots, nullable, strips
 
 GAP_RANGE_FRACTION = 0.004  # of the mean radius: the gap at both ends of the colour ramp
 END_FRACTION = 0.3  # of a line in two parts: each end
@@ -49,19 +49,11 @@ def log_changes(
         new = contacts.select(~are_among(contacts.key, previous.contacts.key))
         ended = previous.contacts.select(~are_among(previous.contacts.key, contacts.key))
         lost = broken_lines(_branches_now(scene, clock.frame, ended))
-    for path, strips, colour in (
+    for path, lines, colour in (
         (entities.NEW_CONTACTS, scene.branches(clock.frame, new), NEW_CONTACT),
         (entities.LOST_CONTACTS, lost, LOST),
     ):
-        clock.log(
-            path,
-            rr.LineStrips2D(
-                strips,
-                radii=np.float32(0.09 * scene.canvas.grain_radius),
-                colors=packed_one(colour),
-                draw_order=25.0,
-            ),
-        )
+        clock.log(path, strips(lines, 0.09 * scene.canvas.grain_radius, colour, 25.0))
 
 
 def broken_lines(lines: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -88,14 +80,10 @@ def gap_colours(gap: Array, reach: float) -> NDArray[np.uint32]:
 
 
 def _log_gaps(clock: Clock, scene: Scene, contacts: Contacts) -> None:
+    points = scene.canvas.points(scene.contact_points(clock.frame, contacts))
     clock.log(
         entities.GAPS,
-        rr.Points2D(
-            scene.canvas.points(scene.contact_points(clock.frame, contacts)).astype(np.float32),
-            radii=np.float32(0.17 * scene.canvas.grain_radius),
-            colors=gap_colours(contacts.gap, gap_range(scene)),
-            draw_order=28.0,
-        ),
+        dots(points, 0.17 * scene.canvas.grain_radius, gap_colours(contacts.gap, gap_range(scene)), 28.0),
         rr.AnyValues(
             # With an explicit type, which an empty list of contacts would lack.
             gap_um=nullable((1e6 * contacts.gap).astype(np.float32)),

@@ -21,6 +21,7 @@ from ..look.clock import Clock
 from ..look.colours import FAINT, INK, LOADED_WALL, Rgba, packed, packed_one
 from ..look.ramp_legend import PIECES
 from ..look.scene import Scene
+from ..look.values import strips
 from .forces.network import SweepChoice, visible_sweeps
 from .legends import scale_bar_of
 
@@ -148,12 +149,9 @@ class FilmWriter:
         outlines = (outline[None] + at[:, None, None]).reshape(-1, 2, 2)
         faint: Rgba = (*FAINT[:3], 200)
         # One array of lines of two points: a list of arrays needs ten times the time.
-        return rr.LineStrips2D(
-            np.concatenate([lines, outlines]).astype(np.float32),
-            radii=np.concatenate([style.radii(force), np.full(len(outlines), 0.05 * self._grain, np.float32)]),
-            colors=np.concatenate([style.colours(force), np.full(len(outlines), packed_one(faint))]).astype(np.uint32),
-            draw_order=20.0,
-        )
+        radii = np.append(style.radii(force), np.full(len(outlines), 0.05 * self._grain, np.float32))
+        colours = np.append(style.colours(force), np.full(len(outlines), packed_one(faint)))
+        return strips(np.concatenate([lines, outlines]), radii, colours.astype(np.uint32), 20.0)
 
     def _outline(self, frame: int) -> Array:
         """Return walls and short joins of straight walls, or the cell, of a frame as lines (l, 2, 2) [px]."""

@@ -15,7 +15,7 @@ from ..look.colours import BOUNDARY, INFERRED, INK, LOADED_WALL, LOST, OUTLINE, 
 from ..look.level_of_detail import is_outlined
 from ..look.printable_text import printable
 from ..look.scene import Scene, cell_corners
-from ..look.values import nullable
+from ..look.values import dots, nullable, strips
 
 SEAM = 0.94  # of a radius, for discs without outlines: a dark seam separates them
 DISC = 0.55  # of the brightness of an outline, for a whole disc
@@ -47,28 +47,21 @@ def _log_walls(clock: Clock, scene: Scene) -> None:
     loaded = walls.loaded
     clock.log(
         entities.WALLS,
-        rr.LineStrips2D(
+        strips(
             [canvas.points(line).astype(np.float32) for line in walls.outlines(clock.frame)],
-            radii=np.where(loaded, 0.14, 0.09) * canvas.grain_radius,
-            colors=np.where(loaded, packed_one(LOADED_WALL), packed_one(WALL)).astype(np.uint32),
-            draw_order=5.0,
+            np.where(loaded, 0.14, 0.09) * canvas.grain_radius,
+            np.where(loaded, packed_one(LOADED_WALL), packed_one(WALL)).astype(np.uint32), 5.0,
         ),
         rr.AnyValues(
             name=[printable(name) for name in walls.name],
             drive=[_drive(walls, row, clock.frame) for row in range(walls.count)],
         ),
-    )
+    )  # fmt: skip
 
 
 def _log_cell(clock: Clock, scene: Scene, vectors: Array) -> None:
     corners = scene.canvas.points(cell_corners(vectors)[[0, 1, 2, 3, 0]])
-    clock.log(
-        entities.CELL,
-        rr.LineStrips2D(
-            corners[None].astype(np.float32), radii=np.float32(0.05 * scene.canvas.grain_radius),
-            colors=packed_one(WALL), draw_order=5.0,
-        ),
-    )  # fmt: skip
+    clock.log(entities.CELL, strips(corners[None], 0.05 * scene.canvas.grain_radius, WALL, 5.0))
 
 
 def _drive(walls: WallTracks, row: int, frame: int) -> str:
@@ -98,12 +91,7 @@ def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
             draw_order=10.0,
         )
         if outlined
-        else rr.Points2D(
-            centre.astype(np.float32),
-            radii=(SEAM * radius).astype(np.float32),
-            colors=dimmed(colours),
-            draw_order=10.0,
-        ),
+        else dots(centre, SEAM * radius, dimmed(colours), 10.0),
         rr.AnyValues(
             id=tracks.id,
             x_mm=nullable(1e3 * tracks.position[frame, :, 0]),
@@ -117,24 +105,10 @@ def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     )
     rotation = tracks.rotation[frame] - _first_rotation(tracks.rotation)
     shown = present & np.isfinite(rotation) & outlined
-    clock.log(
-        entities.GRAIN_SPINS,
-        rr.LineStrips2D(
-            _spin_marks(centre[shown], radius[shown], rotation[shown]),
-            radii=np.float32(0.03 * canvas.grain_radius),
-            colors=packed_one(INK),
-            draw_order=11.0,
-        ),
-    )
-    clock.log(
-        entities.GRAINS_LOST,
-        rr.LineStrips2D(
-            _crosses(centre[~present], radius[~present]),
-            radii=np.float32(0.07 * canvas.grain_radius),
-            colors=packed_one(LOST),
-            draw_order=40.0,
-        ),
-    )
+    marks = _spin_marks(centre[shown], radius[shown], rotation[shown])
+    clock.log(entities.GRAIN_SPINS, strips(marks, 0.03 * canvas.grain_radius, INK, 11.0))
+    crosses = _crosses(centre[~present], radius[~present])
+    clock.log(entities.GRAINS_LOST, strips(crosses, 0.07 * canvas.grain_radius, LOST, 40.0))
 
 
 def grain_colours(

@@ -12,6 +12,7 @@ from ..look.canvas import Canvas
 from ..look.colours import ADDED, BACKGROUND, BOUNDARY, FORBIDDEN, INK, LOST, NEW_CONTACT, SLIDING, packed_one
 from ..look.ramp_legend import PIECES, legend_pieces, legend_span, log_legend_texts, log_ramp_legend
 from ..look.scene import Scene
+from ..look.values import strips
 from .contact_changes import gap_colours, gap_range
 from .forces.contact_colours import COLOURINGS
 from .forces.force_uncertainty import gap_strokes
@@ -47,11 +48,7 @@ def log_force_legend(stream: rr.RecordingStream, scene: Scene) -> None:
     """Log a wedge from zero force to the top of the range, with the mean marked."""
     style, top = scene.style, scene.style.range.top
     fn = np.linspace(0.0, top, PIECES + 1)[1:]
-    stream.log(
-        entities.FORCE_LEGEND,
-        rr.LineStrips2D(legend_pieces(scene.canvas), radii=style.radii(fn), colors=style.colours(fn), draw_order=50.0),
-        static=True,
-    )
+    stream.log(entities.FORCE_LEGEND, style.strips(legend_pieces(scene.canvas), fn, 50.0), static=True)
     mean, unit = style.range.mean, scene.force_unit
     values = [(0.0, "0"), (mean, f"mean {mean:.3g} {unit}"), (0.5 * (top + mean), f"{0.5 * (top + mean):.3g}")]
     values.append((top, f"≥ {top:.3g} {unit}"))
@@ -76,16 +73,9 @@ def _log_gap_key(stream: rr.RecordingStream, scene: Scene) -> None:
     gaps = line_gaps(lines, np.array([relative for _, relative, _ in GAP_KEY]), canvas.grain_radius)
     radii = style.radii(force)
     strokes, width = gap_strokes(gaps, radii[gaps.row], canvas.grain_radius)
-    stream.log(
-        entities.UNCERTAINTY_LEGEND,
-        rr.LineStrips2D(
-            np.concatenate([lines, strokes]).astype(np.float32),
-            radii=np.concatenate([radii, width.astype(np.float32)]),
-            colors=np.concatenate([style.colours(force), np.full(len(strokes), packed_one(BACKGROUND), np.uint32)]),
-            draw_order=50.0,
-        ),
-        static=True,
-    )
+    colours = np.append(style.colours(force), np.full(len(strokes), packed_one(BACKGROUND), np.uint32))
+    drawn = strips(np.concatenate([lines, strokes]), np.append(radii, width), colours, 50.0)
+    stream.log(entities.UNCERTAINTY_LEGEND, drawn, static=True)
     below = np.array([0.0, 0.02 * canvas.legend_height])
     texts = [
         (line.mean(axis=0) + below, text, INK) for line, (_, _, text) in zip(lines, GAP_KEY, strict=True)
@@ -105,30 +95,16 @@ def log_scale_bar(stream: rr.RecordingStream, canvas: Canvas) -> None:
     length, label = scale_bar_of(canvas)
     start = np.array([canvas.left + 0.6 * canvas.grain_radius, canvas.top - 0.8 * canvas.header_height])
     end = start + np.array([length, 0.0])
-    stream.log(
-        entities.SCALE_BAR,
-        rr.LineStrips2D(
-            [np.stack([start, end]).astype(np.float32)], radii=np.float32(0.1 * canvas.grain_radius),
-            colors=packed_one(INK), draw_order=50.0,
-        ),
-        static=True,
-    )  # fmt: skip
+    bar = strips(np.stack([start, end])[None], 0.1 * canvas.grain_radius, INK, 50.0)
+    stream.log(entities.SCALE_BAR, bar, static=True)
     log_texts(stream, entities.SCALE_BAR_LENGTH, [(0.5 * (start + end), label, INK)])
 
 
 def _log_gap_legend(stream: rr.RecordingStream, scene: Scene) -> None:
     reach = gap_range(scene)
     gap = np.linspace(-reach, reach, PIECES)
-    stream.log(
-        entities.GAP_LEGEND,
-        rr.LineStrips2D(
-            legend_pieces(scene.canvas),
-            radii=np.float32(0.22 * scene.canvas.grain_radius),
-            colors=gap_colours(gap, reach),
-            draw_order=50.0,
-        ),
-        static=True,
-    )
+    line = strips(legend_pieces(scene.canvas), 0.22 * scene.canvas.grain_radius, gap_colours(gap, reach), 50.0)
+    stream.log(entities.GAP_LEGEND, line, static=True)
     micrometres = 1e6 * reach
     texts = [(0.0, f"overlap {micrometres:g}"), (0.5, "touching"), (1.0, f"open {micrometres:g} µm")]
     notes = [

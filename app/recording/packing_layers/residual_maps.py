@@ -19,6 +19,7 @@ from ..look import entities
 from ..look.clock import Clock
 from ..look.colours import OPEN, UNCERTAINTY_RAMP, packed, packed_one
 from ..look.scene import Scene
+from ..look.values import dots, strips
 from .forces.network import SweepChoice, visible_sweeps
 from .grains_and_walls import last_seen
 
@@ -63,24 +64,11 @@ def log_residual_maps(
     lost = ~scene.tracks.frame(clock.frame).present[0]
     unbalance[:, lost | ~scene.grains.free] = np.nan  # boundary grains need no balance
     clock.start()
-    clock.log(
-        entities.UNBALANCE_MAP,
-        rr.Points2D(
-            scene.canvas.points(last_seen(scene.tracks.position, clock.frame)).astype(np.float32),
-            radii=(0.94 * scene.canvas.lengths(scene.tracks.radius)).astype(np.float32),
-            colors=residual_colours(unbalance[0]),
-            draw_order=5.0,
-        ),
-    )
-    clock.log(
-        entities.CHANGE_MAP,
-        rr.LineStrips2D(
-            scene.branches(clock.frame, drawn.contacts),
-            radii=np.float32(0.1 * scene.canvas.grain_radius),
-            colors=residual_colours(change[0]),
-            draw_order=20.0,
-        ),
-    )
+    places = scene.canvas.points(last_seen(scene.tracks.position, clock.frame))
+    radii = 0.94 * scene.canvas.lengths(scene.tracks.radius)
+    clock.log(entities.UNBALANCE_MAP, dots(places, radii, residual_colours(unbalance[0]), 5.0))
+    lines = scene.branches(clock.frame, drawn.contacts)
+    clock.log(entities.CHANGE_MAP, strips(lines, 0.1 * scene.canvas.grain_radius, residual_colours(change[0]), 20.0))
     if len(rows) == 1:
         return
     when = clock.columns(rows[1:])

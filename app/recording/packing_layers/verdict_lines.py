@@ -12,6 +12,7 @@ from ..look import entities
 from ..look.clock import Clock
 from ..look.colours import ADDED, FORBIDDEN, packed_one
 from ..look.scene import Scene
+from ..look.values import strips
 from .contact_changes import broken_lines
 
 REVIEWER_SOURCES = (ContactSource.ADDED_BY_REVIEWER, ContactSource.FORBIDDEN_BY_REVIEWER)
@@ -26,11 +27,11 @@ def log_verdicts(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     clock.start()
     clock.log(
         entities.VERDICTS,
-        rr.LineStrips2D(
+        strips(
             np.concatenate([lines[0], broken_lines(lines[1])]),
-            radii=np.float32(0.14 * scene.canvas.grain_radius),
-            colors=np.where(source == REVIEWER_SOURCES[0], packed_one(ADDED), packed_one(FORBIDDEN)).astype(np.uint32),
-            draw_order=30.0,
+            0.14 * scene.canvas.grain_radius,
+            np.where(source == REVIEWER_SOURCES[0], packed_one(ADDED), packed_one(FORBIDDEN)).astype(np.uint32),
+            30.0,
         ),
         rr.AnyValues(
             # With an explicit type, which an empty list would lack.

@@ -15,7 +15,7 @@ from ...look.colours import DIFFERENCE_RAMP, OPEN, packed, packed_one
 from ...look.force_style import ForceStyle
 from ...look.ramp_legend import PIECES, log_ramp_legend
 from ...look.scene import Scene
-from ...look.values import nullable
+from ...look.values import nullable, strips
 from .network import body_values
 
 _RAMP = packed(DIFFERENCE_RAMP)
@@ -66,9 +66,9 @@ def log_difference(clock: Clock, scene: Scene, path: str, key: NDArray[np.int64]
     difference, style = fn[0] - fn[1], difference_style(scene)
     clock.log(
         path,
-        rr.LineStrips2D(
-            scene.branches(clock.frame, contacts), radii=style.radii(np.abs(difference)),
-            colors=difference_colours(difference, style.range.top), draw_order=20.0,
+        strips(
+            scene.branches(clock.frame, contacts), style.radii(np.abs(difference)),
+            difference_colours(difference, style.range.top), 20.0,
         ),
         rr.AnyValues(
             **body_values(scene, contacts), fn_first=nullable(fn[0]), fn_second=nullable(fn[1]),

@@ -11,9 +11,9 @@ from ....solver.bodies.grains import Array
 from ....solver.frame_forces import FrameForces
 from ...look import entities
 from ...look.clock import Clock
-from ...look.colours import BACKGROUND, packed_one
+from ...look.colours import BACKGROUND
 from ...look.scene import Scene
-from ...look.values import nullable
+from ...look.values import nullable, strips
 
 MARGIN = 1.1  # width of a gap over that of its line
 SHORTEST = 1e-3  # of the radius of a grain: half a stroke that would have no length
@@ -71,10 +71,7 @@ def _log_gaps(clock: Clock, scene: Scene, forces: FrameForces, visible: NDArray[
     quantum = scene.style.quantum
     clock.log(
         entities.FORCE_UNCERTAINTY,
-        rr.LineStrips2D(
-            strokes.astype(np.float32), radii=(np.ceil(radii / quantum) * quantum).astype(np.float32),
-            colors=packed_one(BACKGROUND), draw_order=21.0,
-        ),
+        strips(strokes, np.ceil(radii / quantum) * quantum, BACKGROUND, 21.0),
         rr.AnyValues(
             fn=nullable(fn[gaps.row].astype(np.float32)),
             fn_sd=nullable(forces.fn_sd[rows][gaps.row].astype(np.float32)),

@@ -17,10 +17,10 @@ from ....solver.nlgs.sweep_record import SweepHistory
 from ....solver.statistics.force_statistics import mobilisation
 from ...look import entities
 from ...look.clock import Clock
-from ...look.colours import SLIDING, packed_one
+from ...look.colours import SLIDING
 from ...look.force_style import ForceStyle
 from ...look.scene import Scene
-from ...look.values import nullable
+from ...look.values import dots, nullable
 from .contact_colours import contact_colours
 
 CHUNK_BYTES = 1_000_000  # size of one columnar message, the unit in which viewers load and drop data
@@ -65,12 +65,7 @@ def log_network(
     clock.start()
     clock.log(
         entities.FORCES,
-        rr.LineStrips2D(
-            scene.branches(clock.frame, contacts),
-            radii=style.radii(fn[0]),
-            colors=style.colours(fn[0]),
-            draw_order=20.0,
-        ),
+        style.strips(scene.branches(clock.frame, contacts), fn[0]),
         contact_values(scene, forces),
         *contact_colours(scene, forces, previous),
     )
@@ -85,15 +80,7 @@ def _log_far_halves(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     """Log the second halves of contacts across the edge of the cell, as reported; the first are with the others."""
     rows, lines = scene.far_halves(clock.frame, forces.contacts)
     fn = np.nan_to_num(forces.fn[rows])
-    clock.log(
-        entities.FORCES_ACROSS,
-        rr.LineStrips2D(
-            scene.canvas.points(lines).astype(np.float32),
-            radii=scene.style.radii(fn),
-            colors=scene.style.colours(fn),
-            draw_order=20.0,
-        ),
-    )
+    clock.log(entities.FORCES_ACROSS, scene.style.strips(scene.canvas.points(lines), fn))
 
 
 def visible_sweeps(
@@ -248,12 +235,5 @@ def _log_sliding(clock: Clock, scene: Scene, forces: FrameForces) -> None:
 def _log_sliding_points(clock: Clock, scene: Scene, point: NDArray[np.float32], fn: Array) -> None:
     """Log marks whose size increases slightly with the force: weak sliding contacts must not dominate the view."""
     fraction = np.clip(fn / scene.style.range.top, 0.0, 1.0)
-    clock.log(
-        entities.SLIDING,
-        rr.Points2D(
-            point,
-            radii=(scene.canvas.grain_radius * (0.07 + 0.12 * np.sqrt(fraction))).astype(np.float32),
-            colors=packed_one(SLIDING),
-            draw_order=30.0,
-        ),
-    )
+    radii = scene.canvas.grain_radius * (0.07 + 0.12 * np.sqrt(fraction))
+    clock.log(entities.SLIDING, dots(point, radii, SLIDING, 30.0))

@@ -11,11 +11,11 @@ from ....solver.contacts.pairs import align, are_present
 from ....solver.frame_forces import FrameForces
 from ....solver.statistics.agreement import Agreement, compare_forces
 from ...look import entities
-from ...look.axes import Axes, round_step
+from ...look.axes import Axes, log_scatter_axes, scatter
 from ...look.clock import Clock
-from ...look.colours import INK, SERIES, packed_one
+from ...look.colours import SERIES
 from ...look.scene import Scene
-from ...look.values import log_scalar, nullable
+from ...look.values import log_curve_style, log_scalar, nullable
 from .difference import log_difference, log_difference_legend
 from .network import body_values
 
@@ -32,27 +32,15 @@ class TruthWriter:
     def log_axes(self, stream: rr.RecordingStream) -> None:
         """Log axes of the scatter plot and the styles of the curves."""
         log_difference_legend(stream, self._scene, "inferred", "true")
-        top = self._axes.x_range[1]
-        step = round_step(top / 2.5)
-        ticks = [(step * k, f"{step * k:g}") for k in range(int(top / step) + 1)]
-        self._axes.log(
-            stream,
-            entities.TRUTH_AXES,
-            entities.TRUTH_TICKS,
-            x_ticks=ticks,
-            y_ticks=ticks,
-            notes=[
-                (0.8 * top, 0.1 * top, "across: true f_n [N]", INK),
-                (0.26 * top, 0.97 * top, "up: inferred f_n [N]", INK),
-            ],
-            guides=[self._axes.points(np.array([0.0, top]), np.array([0.0, top]))],
+        log_scatter_axes(
+            stream, self._axes, entities.TRUTH_AXES, entities.TRUTH_TICKS, "true f_n [N]", "inferred f_n [N]"
         )
         for path, name, colour in (
             (entities.TRUTH_R_FN, "r(f_n)", SERIES[0]),
             (entities.TRUTH_R_FT, "r(f_t)", SERIES[1]),
             (entities.TRUTH_ERROR, "relative L2", SERIES[3]),
         ):
-            stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=2.0), static=True)
+            log_curve_style(stream, path, name, colour)
 
     def log(self, clock: Clock, forces: FrameForces) -> Agreement:
         """Log the true forces of one frame and return their agreement with the inferred forces."""
@@ -73,12 +61,7 @@ class TruthWriter:
         clock.start()
         clock.log(
             entities.TRUTH_FORCES,
-            rr.LineStrips2D(
-                scene.branches(clock.frame, contacts),
-                radii=scene.style.radii(fn),
-                colors=scene.style.colours(fn),
-                draw_order=20.0,
-            ),
+            scene.style.strips(scene.branches(clock.frame, contacts), fn),
             rr.AnyValues(**body_values(scene, contacts), fn=nullable(fn), ft=nullable(ft)),
         )
         clock.end()
@@ -93,16 +76,7 @@ class TruthWriter:
         both = np.stack([on_inferred, on_truth])[:, present]
         log_difference(clock, scene, entities.TRUTH_DIFFERENCE, union[present], both[..., 0], both[..., 1])
         true_fn, inferred_fn = on_truth[:, 0], on_inferred[:, 0]
-        reach = self._axes.x_range[1]
-        clock.log(
-            entities.TRUTH_SCATTER,
-            rr.Points2D(
-                self._axes.points(np.minimum(true_fn, reach), np.minimum(inferred_fn, reach)),
-                radii=np.float32(2.5),
-                colors=packed_one((*SERIES[0][:3], 200)),
-                draw_order=20.0,
-            ),
-        )
+        clock.log(entities.TRUTH_SCATTER, scatter(self._axes, true_fn, inferred_fn))
         agreement = compare_forces(inferred_key, inferred, key, true)
         log_scalar(clock, entities.TRUTH_R_FN, agreement.r_fn)
         log_scalar(clock, entities.TRUTH_R_FT, agreement.r_ft)

@@ -8,11 +8,11 @@ import rerun as rr
 from ....solver.assessment.fringe_pressures import FringePressures
 from ....solver.bodies.grains import Array
 from ...look import entities
-from ...look.axes import Axes, round_step
+from ...look.axes import Axes, round_ticks
 from ...look.clock import Clock
-from ...look.colours import FAINT, INK, SERIES, packed_one
+from ...look.colours import FAINT, INK, SERIES
 from ...look.scene import Scene
-from ...look.values import log_scalar
+from ...look.values import dots, log_curve_style, log_scalar, strips
 from .grain_map import GrainMap, usual_top
 
 WIDTH, HEIGHT = 600.0, 300.0  # of the plot, in units of its view
@@ -47,7 +47,8 @@ class FringeMaps:
             each.log_legend(stream, self._scene)
         (_, right), (_, high) = self._axes.x_range, self._axes.y_range
         self._axes.log(
-            stream, entities.FRINGE_AXES, entities.FRINGE_TICKS, x_ticks=_ticks(right), y_ticks=_ticks(high),
+            stream, entities.FRINGE_AXES, entities.FRINGE_TICKS, x_ticks=round_ticks(0.0, right, 3.0),
+            y_ticks=round_ticks(0.0, high, 3.0),
             notes=[
                 (0.78 * right, 0.1 * high, "across: G² of a disc", INK),
                 (0.24 * right, 0.97 * high, "up: sum of its f_n over the mean", INK),
@@ -60,16 +61,8 @@ class FringeMaps:
             stream, entities.FRINGES_OF_ALL, self._fringes.ravel()[kept], self._inferred.ravel()[kept], static=True
         )
         curve = self._axes.points(self._found.knot, np.minimum(self._found.level / self._found.mean, high))
-        stream.log(
-            entities.FRINGE_CURVE,
-            rr.LineStrips2D([curve], radii=np.float32(1.6), colors=packed_one(SERIES[1]), draw_order=30.0),
-            static=True,
-        )
-        stream.log(
-            entities.FRINGE_CORRELATION,
-            rr.SeriesLines(colors=[SERIES[0]], names="r of the sums by fringes and by forces", widths=2.0),
-            static=True,
-        )
+        stream.log(entities.FRINGE_CURVE, strips([curve], 1.6, SERIES[1], 30.0), static=True)
+        log_curve_style(stream, entities.FRINGE_CORRELATION, "r of the sums by fringes and by forces", SERIES[0])
 
     def log(self, clock: Clock) -> None:
         """Log the maps, the discs in the plot and the correlation of one frame."""
@@ -89,16 +82,4 @@ class FringeMaps:
             np.minimum(fringes, self._axes.x_range[1]), np.minimum(sums, self._axes.y_range[1])
         )  # fmt: skip
         colour = (*FAINT[:3], 130) if static else (*SERIES[0][:3], 220)
-        stream.log(
-            path,
-            rr.Points2D(
-                points, radii=np.float32(1.4 if static else 2.6), colors=packed_one(colour),
-                draw_order=10.0 if static else 20.0,
-            ),
-            static=static,
-        )  # fmt: skip
-
-
-def _ticks(top: float) -> list[tuple[float, str]]:
-    step = round_step(top / 3.0)
-    return [(step * k, f"{step * k:g}") for k in range(int(top / step) + 1)]
+        stream.log(path, dots(points, *((1.4, colour, 10.0) if static else (2.6, colour, 20.0))), static=static)

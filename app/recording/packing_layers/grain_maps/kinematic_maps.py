@@ -13,7 +13,7 @@ from ...look import entities
 from ...look.clock import Clock
 from ...look.colours import SERIES, packed_one
 from ...look.scene import Scene
-from ...look.values import log_scalar
+from ...look.values import log_curve_style, log_scalar
 from ..grains_and_walls import last_seen
 from .grain_map import GrainMap, usual_top
 
@@ -54,7 +54,7 @@ class KinematicMaps:
             (entities.PARTICIPATION, "participation of the local shear", SERIES[0]),
             (entities.SOLID_FRACTION, "mean local solid fraction", SERIES[1]),
         ):
-            stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=2.0), static=True)
+            log_curve_style(stream, path, name, colour)
 
     def log(self, clock: Clock) -> None:
         """Log the maps and curves of one frame."""
