@@ -17,7 +17,7 @@ MOST_FILES, MOST_AT_THE_ROOT = 12, 9
 MOST_LINES = 400
 # Parameters that users write by name: options of the command line, keyword arguments of a verb, fields of a request.
 COMMANDS = "app/cli/commands/"
-NAMED_BY_USERS = {"app/notebook/solve.py: solve", "app/workbench/service/correction_endpoints.py: correct_pose"}
+NAMED_BY_USERS = {"app/notebook/solve.py: solve"}
 LONG = {"app/tracking/correlation/kernels.py"}  # one chain of kernels
 
 

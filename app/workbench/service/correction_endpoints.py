@@ -36,9 +36,8 @@ from ..correcting.proposals import (
 from ..correcting.retracking import changes, track_again, with_frame
 from ..correcting.rod_following import follow_rod
 from ..inspecting.run_data import first_photograph, list_rods
-from .endpoints import Number, Text, Whole, editing_endpoint, endpoint
+from .endpoints import Number, Whole, editing_endpoint, endpoint
 from .project import Project
-from .workbench import Workbench
 
 DETECTIONS = "detections.csv"
 APPLIED = 1.0  # [px] largest distance of a track from a correction that it follows
@@ -46,9 +45,8 @@ Pose = tuple[float, float, float]
 
 
 @endpoint
-def poses(workbench: Workbench, at: Text, frame: Whole) -> dict[str, Any]:
+def poses(opened: Project, frame: Whole) -> dict[str, Any]:
     """List the rods of a photograph as they were tracked, lost ones where they were seen last, and all corrections."""
-    opened = workbench.project(at)
     tracks, scale, first = _tracks(opened), opened.tracks_scale(), _first(opened)
     k = frame - first
     if not 0 <= k < tracks.frame_count:
@@ -77,12 +75,11 @@ def _rods_of(tracks: Tracks, k: int, scale: Scale, first: int) -> dict[str, Any]
 
 
 @endpoint
-def propose_pose(workbench: Workbench, at: Text, frame: Whole, id: Whole) -> dict[str, Any]:
+def propose_pose(opened: Project, frame: Whole, id: Whole) -> dict[str, Any]:
     """Propose a pose of a rod: from its last good photograph, by the motion of its neighbours, at all angles.
 
     A pose on another rod is not proposed: pose None.
     """
-    opened = workbench.project(at)
     _exists(opened, frame)
     first, tracked = _first(opened), _tracked(opened)
     row, k = _row(tracked, id), frame - first
@@ -96,12 +93,11 @@ def propose_pose(workbench: Workbench, at: Text, frame: Whole, id: Whole) -> dic
 
 
 @endpoint
-def tracked_again(workbench: Workbench, at: Text, frame: Whole, id: Whole) -> dict[str, Any]:
+def tracked_again(opened: Project, frame: Whole, id: Whole) -> dict[str, Any]:
     """Track a photograph again with its corrections, as the next run will; nothing is written.
 
     `changes`: the rod and its neighbours before and after, and all whose status has changed.
     """
-    opened = workbench.project(at)
     _exists(opened, frame)
     _not_first(opened, frame)
     tracks, scale, first = _tracks(opened), opened.tracks_scale(), _first(opened)
@@ -140,24 +136,20 @@ def _in_picture(pose: tuple[float, float, float | None]) -> Pose:
 
 
 @endpoint
-def prepare_photograph(workbench: Workbench, at: Text, frame: Whole) -> dict[str, Any]:
+def prepare_photograph(opened: Project, frame: Whole) -> dict[str, Any]:
     """Prepare a photograph for correlation, so that the first rod is correlated without delay."""
-    opened = workbench.project(at)
     _exists(opened, frame)
     _editor(opened).prepare(frame - _first(opened))
     return {"ready": frame}
 
 
 @endpoint
-def correlate(
-    workbench: Workbench, at: Text, frame: Whole, id: Whole, x: Number, y: Number, angle: Number
-) -> dict[str, Any]:
+def correlate(opened: Project, frame: Whole, id: Whole, x: Number, y: Number, angle: Number) -> dict[str, Any]:
     """Fit a rod from a pose given by hand; nothing is written. angle [rad]: in the picture, clockwise as seen.
 
     `pictures` have `side` × `side` bytes: the rod on the first photograph; at the given pose, and the difference; at
     the fitted pose, and the difference.
     """
-    opened = workbench.project(at)
     _exists(opened, frame)
     tracked, k = _tracked(opened), frame - _first(opened)
     found = _correlated(opened, tracked, id, k, (x, y, angle))
@@ -171,8 +163,7 @@ def correlate(
 
 @editing_endpoint
 def correct_pose(
-    workbench: Workbench,
-    at: Text,
+    opened: Project,
     frame: Whole,
     id: Whole,
     x: Number,
@@ -184,7 +175,6 @@ def correct_pose(
 
     following: correct the photographs after it as well, until the track of the rod agrees.
     """
-    opened = workbench.project(at)
     _exists(opened, frame)
     _not_first(opened, frame)
     tracked = _tracked(opened)
@@ -203,9 +193,8 @@ def correct_pose(
 
 
 @editing_endpoint
-def mark_lost(workbench: Workbench, at: Text, frame: Whole, id: Whole) -> dict[str, Any]:
+def mark_lost(opened: Project, frame: Whole, id: Whole) -> dict[str, Any]:
     """Mark a rod as not visible in a photograph."""
-    opened = workbench.project(at)
     _exists(opened, frame)
     _not_first(opened, frame)
     with logged(opened, "hidden"):
@@ -214,27 +203,24 @@ def mark_lost(workbench: Workbench, at: Text, frame: Whole, id: Whole) -> dict[s
 
 
 @editing_endpoint
-def undo_correction(workbench: Workbench, at: Text, frame: Whole, id: Whole) -> dict[str, Any]:
-    opened = workbench.project(at)
+def undo_correction(opened: Project, frame: Whole, id: Whole) -> dict[str, Any]:
     with logged(opened, "removed"):
         corrections.remove_correction(opened.draft, opened.validation(), frame, id)
     return _corrected(opened)
 
 
 @endpoint
-def corrections_log(workbench: Workbench, at: Text) -> dict[str, Any]:
+def corrections_log(opened: Project) -> dict[str, Any]:
     """List the changes of the table of corrections, the latest first."""
-    opened = workbench.project(at)
     return {"changes": read_changes(opened.folder)}
 
 
 @editing_endpoint
-def undo(workbench: Workbench, at: Text) -> dict[str, Any]:
+def undo(opened: Project) -> dict[str, Any]:
     """Undo the last action, whatever it was: a change of any step, or a verdict.
 
     `undone`: its name; `verdict`: photograph and pair, where it was one.
     """
-    opened = workbench.project(at)
     with logged(opened, "undone"):
         action = opened.revert(back=True)
     if action is None:
@@ -243,9 +229,8 @@ def undo(workbench: Workbench, at: Text) -> dict[str, Any]:
 
 
 @editing_endpoint
-def redo(workbench: Workbench, at: Text) -> dict[str, Any]:
+def redo(opened: Project) -> dict[str, Any]:
     """Repeat the action that was undone last."""
-    opened = workbench.project(at)
     with logged(opened, "redone"):
         action = opened.revert(back=False)
     if action is None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, ValidationError, validate_call
@@ -54,9 +56,31 @@ class Values(BaseModel):
 
 
 def endpoint(function: Endpoint) -> Endpoint:
-    """Serve a function under its name; its annotations are the checks of its values."""
-    ENDPOINTS[function.__name__] = validate_call(config=_RULES)(function)
+    """Serve a function under its name; its annotations are the checks of its values.
+
+    A function of an experiment, `opened`, is given it by the path in the request, `at`; where such a function returns
+    nothing, the answer is the description of the experiment.
+    """
+    opens = "opened" in signature(function).parameters
+    ENDPOINTS[function.__name__] = validate_call(config=_RULES)(_opening(function) if opens else function)
     return function
+
+
+def _opening(function: Endpoint) -> Endpoint:
+    """Return a function of an experiment as one of the workbench and its path, which is opened when all is checked."""
+
+    @wraps(function)
+    def opening(workbench: Workbench, at: str, **values: Any) -> Any:
+        opened = workbench.project(at)
+        answer = function(opened, **values)
+        return opened.describe() if answer is None else answer
+
+    kinds = {"workbench": Workbench, "at": Text}
+    first = [Parameter(name, Parameter.POSITIONAL_OR_KEYWORD, annotation=kind) for name, kind in kinds.items()]
+    rest = list(signature(function).parameters.values())[1:]
+    opening.__signature__ = Signature([*first, *rest])  # type: ignore[attr-defined]
+    opening.__annotations__ = {**function.__annotations__, **kinds}
+    return opening
 
 
 def editing_endpoint(function: Endpoint) -> Endpoint:
@@ -152,14 +176,14 @@ def script(workbench: Workbench, at: Text) -> dict[str, Any]:
 
 
 @endpoint
-def stamp(workbench: Workbench, at: Text) -> dict[str, Any]:
+def stamp(opened: Project) -> dict[str, Any]:
     """Return a text that changes when another window or another program has changed the experiment."""
-    return {"stamp": workbench.project(at).stamp()}
+    return {"stamp": opened.stamp()}
 
 
 @endpoint
-def project(workbench: Workbench, at: Text) -> dict[str, Any]:
-    return workbench.project(at).describe()
+def project(opened: Project) -> dict[str, Any]:
+    return opened.describe()
 
 
 class Query(BaseModel):

@@ -13,15 +13,13 @@ from ...reviewing.rounding import rounded, rounded_one
 from ...tracks import TrackStatus
 from ..inspecting.grain_motion import grain_motion
 from ..inspecting.pair_history import forces_without, pair_history
-from .endpoints import BadRequest, Name, Text, Whole, endpoint
+from .endpoints import BadRequest, Name, Whole, endpoint
 from .project import Project
-from .workbench import Workbench
 
 
 @endpoint
-def pair(workbench: Workbench, at: Text, i: Name, j: Name) -> dict[str, Any]:
+def pair(opened: Project, i: Name, j: Name) -> dict[str, Any]:
     """Describe one pair in every photograph up to the last one that is solved; places in pixels."""
-    opened = workbench.project(at)
     results, first = _results(opened)
     history = pair_history(results, i, j)
     if history is None:
@@ -33,21 +31,20 @@ def pair(workbench: Workbench, at: Text, i: Name, j: Name) -> dict[str, Any]:
 
 
 @endpoint
-def without_contact(workbench: Workbench, at: Text, frame: Whole, i: Name, j: Name) -> dict[str, Any]:
+def without_contact(opened: Project, frame: Whole, i: Name, j: Name) -> dict[str, Any]:
     """Compute the nearest forces of a photograph without a contact; nothing is written."""
-    answer = forces_without(*_frame_of(workbench.project(at), frame), i, j)
+    answer = forces_without(*_frame_of(opened, frame), i, j)
     if answer is None:
         raise InputError(f"{i} - {j}", f"photograph {frame}", "is no contact there")
     return answer
 
 
 @endpoint
-def motion(workbench: Workbench, at: Text, frame: Whole, since: Whole | None = None) -> dict[str, Any]:
+def motion(opened: Project, frame: Whole, since: Whole | None = None) -> dict[str, Any]:
     """Describe how the rods of a photograph have moved, and what they carry.
 
     since: a photograph; None: over the window of the results.
     """
-    opened = workbench.project(at)
     run = opened.reviewed_run()
     first, stop = run.first_frame, run.first_frame + len(run.results.frames)
     for photograph in (frame, frame if since is None else since):
@@ -59,12 +56,12 @@ def motion(workbench: Workbench, at: Text, frame: Whole, since: Whole | None = N
 
 
 @endpoint
-def figure(workbench: Workbench, at: Text, frame: Whole) -> dict[str, Any]:
+def figure(opened: Project, frame: Whole) -> dict[str, Any]:
     """Draw the forces of a photograph as SVG, as `rodsight export figures` does."""
     from ...figures.figure_style import paper_style  # drawing is imported where it is used
     from ...figures.force_network import draw_forces
 
-    results, row = _frame_of(workbench.project(at), frame)
+    results, row = _frame_of(opened, frame)
     stream = io.StringIO()
     with paper_style():
         draw_forces(results, row, "double").savefig(stream, format="svg", metadata={"Date": None})
@@ -72,9 +69,8 @@ def figure(workbench: Workbench, at: Text, frame: Whole) -> dict[str, Any]:
 
 
 @endpoint
-def rod(workbench: Workbench, at: Text, id: Whole) -> dict[str, Any]:
+def rod(opened: Project, id: Whole) -> dict[str, Any]:
     """Describe one rod in every photograph up to the last one that is solved."""
-    opened = workbench.project(at)
     results, first = _results(opened)
     tracks = results.tracks
     rows = (tracks.id == id).nonzero()[0]

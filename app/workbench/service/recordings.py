@@ -45,7 +45,7 @@ def recording(workbench: Workbench, at: Text) -> dict[str, Any]:
 
 @endpoint
 def share(
-    workbench: Workbench, at: Text, first: Whole = 0, stop: Whole | None = None,
+    opened: Project, first: Whole = 0, stop: Whole | None = None,
     scale: Annotated[Number, Field(gt=0.0, le=1.0)] = 1.0, although_out_of_date: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
     """Write the HTML file that any browser opens, as `rodsight share --html` does, of frames first … stop − 1."""
@@ -53,7 +53,6 @@ def share(
     from ...recording.archive.share import share_recording
     from ...recording.viewing.single_page import write_single_page
 
-    opened = workbench.project(at)
     source, target = opened.results / RECORDING, opened.results / f"{opened.results.name}-share.rrd"
     if not source.is_file():
         raise InputError(opened.results, "", "holds no recording: let the run end first")
@@ -65,13 +64,12 @@ def share(
     except ValueError as error:
         raise InputError(source, "", str(error)) from None
     write_single_page([target], target.with_suffix(".html"), title=opened.name, cards=[make_card(target)])
-    return shared(workbench, at) | {"frames": report.frames}
+    return shared(opened) | {"frames": report.frames}
 
 
 @endpoint
-def shared(workbench: Workbench, at: Text) -> dict[str, Any]:
+def shared(opened: Project) -> dict[str, Any]:
     """Describe the file that can be sent; file None: there is none. old: the recording is newer."""
-    opened = workbench.project(at)
     page, recording = _page_of(opened), opened.results / RECORDING
     if not page.is_file():
         return {"file": None, "ready": recording.is_file()}

@@ -13,6 +13,7 @@ from ...verdicts.log import Entry, Flag, Origin, Verdict
 from ...verdicts.reviewer_name import account_name
 from ..inspecting.run_data import list_rods
 from .endpoints import Name, Number, Text, Values, Whole, endpoint
+from .project import Project
 from .workbench import Workbench
 
 LONGEST = 300.0  # [s] of one verdict: beyond it the reviewer was away
@@ -56,15 +57,15 @@ def reviewer(workbench: Workbench) -> dict[str, Any]:
 
 
 @endpoint
-def review_status(workbench: Workbench, at: Text, view: ViewValues) -> dict[str, Any]:
+def review_status(opened: Project, view: ViewValues) -> dict[str, Any]:
     """Describe progress, flags, estimated accuracy and agreement."""
-    return _session(workbench, at).status(view.view())
+    return opened.review_session().status(view.view())
 
 
 @endpoint
-def candidate_pairs(workbench: Workbench, at: Text, view: ViewValues) -> dict[str, Any]:
+def candidate_pairs(opened: Project, view: ViewValues) -> dict[str, Any]:
     """List rods, walls and candidate pairs of a photograph, by influence times ambiguity, with verdicts."""
-    session = _session(workbench, at)
+    session = opened.review_session()
     listed, frame = session.list_pairs(view.view()), view.frame - session.run.first_frame
     results, scale = session.results, session.scale
     return {
@@ -75,9 +76,9 @@ def candidate_pairs(workbench: Workbench, at: Text, view: ViewValues) -> dict[st
 
 
 @endpoint
-def next_pair(workbench: Workbench, at: Text, view: ViewValues, after: PairValues | None = None) -> dict[str, Any]:
+def next_pair(opened: Project, view: ViewValues, after: PairValues | None = None) -> dict[str, Any]:
     """Describe the next pair without a verdict."""
-    session = _session(workbench, at)
+    session = opened.review_session()
     key = None
     if after is not None:
         frame = after.frame - session.run.first_frame
@@ -96,9 +97,9 @@ def pair_at(workbench: Workbench, at: Text, view: ViewValues, x: Number, y: Numb
 
 
 @endpoint
-def pair_named(workbench: Workbench, at: Text, view: ViewValues, i: Name, j: Name) -> dict[str, Any]:
+def pair_named(opened: Project, view: ViewValues, i: Name, j: Name) -> dict[str, Any]:
     """Select a pair by the names of its bodies."""
-    return {"pair": _session(workbench, at).pair_named(view.view(), i, j)}
+    return {"pair": opened.review_session().pair_named(view.view(), i, j)}
 
 
 @endpoint
@@ -128,15 +129,15 @@ def flag_frame(
 
 
 @endpoint
-def undo_verdict(workbench: Workbench, at: Text, view: ViewValues) -> dict[str, Any]:
+def undo_verdict(opened: Project, view: ViewValues) -> dict[str, Any]:
     """Undo the reviewer's last verdict or flag."""
-    return _session(workbench, at).undo(view.view())
+    return opened.review_session().undo(view.view())
 
 
 @endpoint
-def reviewed_pairs(workbench: Workbench, at: Text, reviewer: Text) -> dict[str, Any]:
+def reviewed_pairs(opened: Project, reviewer: Text) -> dict[str, Any]:
     """List this reviewer's verdicts with the forces before them and in the present results."""
-    session = _session(workbench, at)
+    session = opened.review_session()
     pairs = list_reviewed_pairs(session.run, session.log, reviewer)
     return {
         "pairs": [
@@ -150,9 +151,9 @@ def reviewed_pairs(workbench: Workbench, at: Text, reviewer: Text) -> dict[str, 
 
 
 @endpoint
-def agreement(workbench: Workbench, at: Text) -> dict[str, Any]:
+def agreement(opened: Project) -> dict[str, Any]:
     """Compare the verdicts of all reviewers with each other and with the detector."""
-    return describe_agreement(_session(workbench, at).run)
+    return describe_agreement(opened.review_session().run)
 
 
 def _record(workbench: Workbench, at: str, reviewer: str) -> None:

@@ -12,15 +12,14 @@ from ...recording.look.colours import DIFFERENCE_RAMP, GAP_RAMP, OPEN, PROBABILI
 from ...recording.look.force_style import THICKEST, THINNEST
 from ...run_folder import refuse_foreign_folder
 from ..inspecting.run_data import RunData, contact_history, frame_network, frame_summaries
-from .endpoints import Name, Text, Whole, endpoint
+from .endpoints import Name, Whole, endpoint
 from .project import Project
 from .workbench import Workbench
 
 
 @endpoint
-def run_start(workbench: Workbench, at: Text, follow: bool = False) -> dict[str, Any]:
+def run_start(opened: Project, follow: bool = False) -> dict[str, Any]:
     """Start or resume the run, exactly as `rodsight run` does in this folder."""
-    opened = workbench.project(at)
     validation = opened.validation()
     if not validation.ready:
         missing = [text for step in validation.steps.values() if step.mark == "missing" for text in step.messages]
@@ -32,9 +31,9 @@ def run_start(workbench: Workbench, at: Text, follow: bool = False) -> dict[str,
 
 
 @endpoint
-def prediction(workbench: Workbench, at: Text) -> dict[str, Any]:
+def prediction(opened: Project) -> dict[str, Any]:
     """Predict the accuracy of the forces from the first photographs, as `rodsight check` does."""
-    validation = workbench.project(at).validation()
+    validation = opened.validation()
     if validation.experiment is None or not validation.ready:
         raise InputError("check", "", "needs a complete set-up: something is still missing")
     notes: list[str] = []
@@ -47,24 +46,21 @@ def prediction(workbench: Workbench, at: Text) -> dict[str, Any]:
 
 
 @endpoint
-def run_pause(workbench: Workbench, at: Text) -> dict[str, Any]:
-    opened = workbench.project(at)
+def run_pause(opened: Project) -> dict[str, Any]:
     opened.job.pause()
     return opened.job.as_values()
 
 
 @endpoint
-def run_cancel(workbench: Workbench, at: Text) -> dict[str, Any]:
+def run_cancel(opened: Project) -> dict[str, Any]:
     """End the run, and remove the frames of its unfinished stage."""
-    opened = workbench.project(at)
     opened.job.pause(discard=True)
     return opened.job.as_values()
 
 
 @endpoint
-def run_state(workbench: Workbench, at: Text) -> dict[str, Any]:
+def run_state(opened: Project) -> dict[str, Any]:
     """Describe the run, and the frames that are solved."""
-    opened = workbench.project(at)
     data = opened.run_data()
     frames = None if data is None else frame_summaries(data)
     return {"job": opened.job.as_values(), "frames": frames, "files": opened.photograph_count()}
@@ -86,16 +82,15 @@ def force_look(workbench: Workbench) -> dict[str, Any]:
 
 
 @endpoint
-def network(workbench: Workbench, at: Text, frame: Whole) -> dict[str, Any]:
+def network(opened: Project, frame: Whole) -> dict[str, Any]:
     """Describe contacts, forces and rods of a photograph."""
-    opened = workbench.project(at)
     return frame_network(_data_with(opened, frame), frame, opened.scene().scale)
 
 
 @endpoint
-def contact(workbench: Workbench, at: Text, i: Name, j: Name) -> dict[str, Any]:
+def contact(opened: Project, i: Name, j: Name) -> dict[str, Any]:
     """Describe one contact in all frames."""
-    return contact_history(_data(workbench.project(at)), i, j)
+    return contact_history(_data(opened), i, j)
 
 
 def _data(opened: Project) -> RunData:

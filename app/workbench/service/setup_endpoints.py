@@ -34,12 +34,11 @@ Region = Annotated[list[Whole], Field(min_length=4, max_length=4)]
 
 @editing_endpoint
 def set_photographs(
-    workbench: Workbench, at: Text, name: Text | None = None, interval: Number | None = None,
+    opened: Project, name: Text | None = None, interval: Number | None = None,
     channel: Literal["grey", "red", "green", "blue"] | None = None, region: Region | Literal["all"] | None = None,
     mask: list[Polygon] | None = None,
-) -> dict[str, Any]:  # fmt: skip
+) -> None:  # fmt: skip
     """Set the given values; the others are not changed."""
-    opened = workbench.project(at)
     keys: dict[str, Any] = {}
     if name is not None:
         keys["name"] = name
@@ -52,55 +51,44 @@ def set_photographs(
     if mask is not None:
         keys["photographs.mask"] = [[_rounded(point) for point in polygon] for polygon in mask] or None
     opened.draft.set_keys("photographs" if mask is None else "mask", keys)
-    return opened.describe()
 
 
 @editing_endpoint
-def brush_mask(workbench: Workbench, at: Text, points: Stroke, radius: Brush) -> dict[str, Any]:
+def brush_mask(opened: Project, points: Stroke, radius: Brush) -> None:
     """Add a stroke of a round brush [px] to the mask."""
-    opened = workbench.project(at)
     photograph_series.add_to_mask(opened.draft, opened.validation(), points, radius)
-    return opened.describe()
 
 
 @editing_endpoint
-def set_order(workbench: Workbench, at: Text, files: Files, change: Text = "order") -> dict[str, Any]:
+def set_order(opened: Project, files: Files, change: Text = "order") -> None:
     """Use the named photographs in this order, and leave the others out."""
-    opened = workbench.project(at)
     with opened.with_verdicts():
         photograph_series.set_order(opened.draft, opened.validation(), files, change)
-    return opened.describe()
 
 
 @editing_endpoint
-def number_by_names(workbench: Workbench, at: Text) -> dict[str, Any]:
+def number_by_names(opened: Project) -> None:
     """Take the places in time of the photographs from the numbers in their names."""
-    opened = workbench.project(at)
     photograph_series.number_by_names(opened.draft, opened.validation())
-    return opened.describe()
 
 
 @editing_endpoint
-def use_camera_times(workbench: Workbench, at: Text) -> dict[str, Any]:
+def use_camera_times(opened: Project) -> None:
     """Order the photographs by the camera's clock, and take their times from it."""
-    opened = workbench.project(at)
     with opened.with_verdicts():
         photograph_series.use_camera_times(opened.draft, opened.validation())
-    return opened.describe()
 
 
 @editing_endpoint
-def rotate(workbench: Workbench, at: Text, rotation: Literal[0, 90, 180, 270]) -> dict[str, Any]:
+def rotate(opened: Project, rotation: Literal[0, 90, 180, 270]) -> None:
     """Rotate the photographs clockwise by so many degrees in all, with everything that is drawn on them."""
-    opened = workbench.project(at)
     photograph_series.rotate(opened.draft, opened.validation(), rotation)
-    return opened.describe()
 
 
 @endpoint
-def quality(workbench: Workbench, at: Text) -> dict[str, Any]:
+def quality(opened: Project) -> dict[str, Any]:
     """Measure the quality of the photographs, as `rodsight check` does, and the illumination of some of them."""
-    measured = workbench.project(at).quality()
+    measured = opened.quality()
     return {
         "facts": measured.facts(), "faults": measured.faults(), "frame": measured.frame.tolist(),
         "light": measured.light.tolist(), "contrast": measured.contrast.tolist(),
@@ -116,11 +104,10 @@ class Measured(Values):
 
 @editing_endpoint
 def set_scale(
-    workbench: Workbench, at: Text, pixel_size: Number | None = None, line: Line | None = None,
+    opened: Project, pixel_size: Number | None = None, line: Line | None = None,
     metres: Number | None = None, rods: list[Measured] | None = None,
-) -> dict[str, Any]:  # fmt: skip
+) -> None:  # fmt: skip
     """Set the scale by the size of a pixel, by two points and their distance, or by rods of known radius."""
-    opened = workbench.project(at)
     if line is not None and metres is not None:
         keys = {"photographs.distance": {"start": _rounded(line[0]), "end": _rounded(line[1]), "metres": metres}}
     elif rods:
@@ -133,42 +120,31 @@ def set_scale(
     else:
         raise InputError("scale", "", "give the size of a pixel, a line and its length, or rods of known radius")
     edits.set_scale(opened.draft, keys)
-    return opened.describe()
 
 
 @editing_endpoint
-def set_lens(workbench: Workbench, at: Text, lens: Lens | None = None) -> dict[str, Any]:
+def set_lens(opened: Project, lens: Lens | None = None) -> None:
     """Set the coefficients of OpenCV's or of Brown's model; None: the distortion is estimated from the gaps."""
-    opened = workbench.project(at)
     edits.set_lens(opened.draft, None if lens is None else dict(lens))
-    return opened.describe()
 
 
 @editing_endpoint
-def set_table(
-    workbench: Workbench, at: Text, name: Literal["times", "load", "forces"], table: Written | None = None
-) -> dict[str, Any]:
+def set_table(opened: Project, name: Literal["times", "load", "forces"], table: Written | None = None) -> None:
     """Set a table of another program: times of photographs, load of walls, forces to compare with; None: remove it."""
-    opened = workbench.project(at)
     edits.set_table(opened.draft, opened.validation(), name, table)
-    return opened.describe()
 
 
 @endpoint
-def measure_rod(workbench: Workbench, at: Text, x: Number, y: Number, radius: Number) -> dict[str, Any]:
+def measure_rod(opened: Project, x: Number, y: Number, radius: Number) -> dict[str, Any]:
     """Fit the circle of a rod near a drawn one."""
-    opened = workbench.project(at)
     fitted = fit_clicked(opened.photograph(0), (x, y, max(radius, 3.0)))
     x, y, radius = fitted or (x, y, radius)
     return {"x": x, "y": y, "r": radius, "seen": fitted is not None}
 
 
 @editing_endpoint
-def draw_wall(
-    workbench: Workbench, at: Text, line: Line, name: Text | None = None, snap: bool = True
-) -> dict[str, Any]:
+def draw_wall(opened: Project, line: Line, name: Text | None = None, snap: bool = True) -> dict[str, Any]:
     """Draw a new wall, or redraw the named one."""
-    opened = workbench.project(at)
     found = _scaled(opened)
     drawn, fraction = np.array(line), 1.0
     if snap:
@@ -186,23 +162,21 @@ def draw_wall(
 
 
 @editing_endpoint
-def find_walls(workbench: Workbench, at: Text) -> dict[str, Any]:
+def find_walls(opened: Project) -> dict[str, Any]:
     """Find the bars around the rods, and the discs in the corners where they meet."""
-    opened = workbench.project(at)
     count, discs = found_walls.find_frame(opened.draft, opened.photograph(0), _scaled(opened))
     return opened.describe() | {"bars": count, "discs": discs}
 
 
 @editing_endpoint
 def draw_circle(
-    workbench: Workbench, at: Text, points: Three | None = None, place: Round | None = None, name: Text | None = None,
+    opened: Project, points: Three | None = None, place: Round | None = None, name: Text | None = None,
     side: Literal["in", "out"] = "in", snap: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
     """Draw a circular wall, or redraw the named one: through three points, by its place, or around the rods.
 
     side: of the packing. place: x, y and radius [px]. snap: move it onto the visible edge beside it.
     """
-    opened = workbench.project(at)
     found = _scaled(opened)
     name = _free("circle", found) if name is None else name
     if name in circles.corner_names(found):
@@ -223,17 +197,14 @@ def draw_circle(
 
 
 @editing_endpoint
-def make_corner(workbench: Workbench, at: Text, name: Text) -> dict[str, Any]:
+def make_corner(opened: Project, name: Text) -> None:
     """Make a circular wall a disc in a corner of the frame: it moves with the bar that it is fixed to."""
-    opened = workbench.project(at)
     circles.make_corner(opened.draft, _scaled(opened), name)
-    return opened.describe()
 
 
 @editing_endpoint
-def find_corner(workbench: Workbench, at: Text, x: Number, y: Number) -> dict[str, Any]:
+def find_corner(opened: Project, x: Number, y: Number) -> dict[str, Any]:
     """Find the disc in a corner of the frame that was clicked [px]."""
-    opened = workbench.project(at)
     found = _scaled(opened)
     disc = circles.corner_at(opened.photograph(0), found, x, y)
     found_walls.add_discs(opened.draft, found, [disc])
@@ -241,47 +212,40 @@ def find_corner(workbench: Workbench, at: Text, x: Number, y: Number) -> dict[st
 
 
 @editing_endpoint
-def delete_wall(workbench: Workbench, at: Text, name: Text) -> dict[str, Any]:
-    opened = workbench.project(at)
+def delete_wall(opened: Project, name: Text) -> None:
     found = _scaled(opened)
     if name in circles.corner_names(found):
         with opened.draft.one_step(f"corner {name} deleted"):
             if "file" not in found.data["walls"]:  # the bars ran through the discs' centres
                 edits.set_walls(opened.draft, found, circles.bars_of(found), "bars")
             circles.delete_corner(opened.draft, opened.validation(), name)
-        return opened.describe()
+        return
     if any(each.name == name for each in circles.circles_of(found)):
         left = [each for each in circles.circles_of(found) if each.name != name]
         circles.set_circles(opened.draft, found, left, f"wall {name} deleted")
-        return opened.describe()
+        return
     others = [each for each in circles.bars_of(found) if each[0] != name]
     edits.set_walls(opened.draft, found, others, f"wall {name} deleted")
-    return opened.describe()
 
 
 @editing_endpoint
-def rename_wall(workbench: Workbench, at: Text, name: Text, to: Text) -> dict[str, Any]:
-    opened = workbench.project(at)
+def rename_wall(opened: Project, name: Text, to: Text) -> None:
     edits.rename_wall(opened.draft, opened.validation(), name, to)
-    return opened.describe()
 
 
 @editing_endpoint
 def set_plate(
-    workbench: Workbench, at: Text, name: Text, pressure: Pressure | None = None,
+    opened: Project, name: Text, pressure: Pressure | None = None,
     ends: Literal["auto", "bar", "corner"] = "auto",
-) -> dict[str, Any]:  # fmt: skip
+) -> None:  # fmt: skip
     """Set pressure and ends of a wall; pressure None: the wall has its measured motion."""
-    opened = workbench.project(at)
     values = {"pressure": pressure, "ends": None if ends == "auto" else ends}
     edits.set_plate(opened.draft, opened.validation(), name, values)
-    return opened.describe()
 
 
 @editing_endpoint
-def detect_rods(workbench: Workbench, at: Text, radii: Numbers) -> dict[str, Any]:
+def detect_rods(opened: Project, radii: Numbers) -> dict[str, Any]:
     """Detect the rods of the first photograph; radii [m]: the classes, empty where they are not known."""
-    opened = workbench.project(at)
     image = opened.used_photograph(0)
     detection = edits.within_picture(edits.detect(image, opened.validation(), radii), image)
     edits.set_rods(opened.draft, f"{detection.count} rods found", edits.as_guess(detection), radii)
@@ -289,39 +253,32 @@ def detect_rods(workbench: Workbench, at: Text, radii: Numbers) -> dict[str, Any
 
 
 @editing_endpoint
-def add_rod(workbench: Workbench, at: Text, x: Number, y: Number, radius: Number) -> dict[str, Any]:
+def add_rod(opened: Project, x: Number, y: Number, radius: Number) -> None:
     """Add a rod at a click; its circle is fitted to the visible rim."""
-    opened = workbench.project(at)
     found = opened.validation()
     pose = edits.fit_rod(opened.photograph(0), found, x, y, max(radius, 3.0))
     edits.set_rods(opened.draft, "rod added", edits.with_rod(found.rods, None, pose))
-    return opened.describe()
 
 
 @editing_endpoint
-def move_rod(workbench: Workbench, at: Text, id: Whole, x: Number, y: Number, radius: Number) -> dict[str, Any]:
-    opened = workbench.project(at)
+def move_rod(opened: Project, id: Whole, x: Number, y: Number, radius: Number) -> None:
     rods = edits.with_rod(opened.validation().rods, id, (x, y, max(radius, 1.0)))
     edits.set_rods(opened.draft, f"rod {id} moved", rods)
-    return opened.describe()
 
 
 @editing_endpoint
-def delete_rods(workbench: Workbench, at: Text, ids: Annotated[list[Whole], Field(min_length=1)]) -> dict[str, Any]:
-    opened = workbench.project(at)
+def delete_rods(opened: Project, ids: Annotated[list[Whole], Field(min_length=1)]) -> None:
     rods = opened.validation().rods
     for each in ids:
         rods = edits.with_rod(rods, each, None)
     if rods is not None:
         what = f"{len(ids)} rods deleted" if len(ids) > 1 else f"rod {ids[0]} deleted"
         edits.set_rods(opened.draft, what, rods)
-    return opened.describe()
 
 
 @editing_endpoint
-def drop_outside(workbench: Workbench, at: Text) -> dict[str, Any]:
+def drop_outside(opened: Project) -> None:
     """Delete the rods that lie outside the walls."""
-    opened = workbench.project(at)
     found = opened.validation()
     outside = outside_walls(found)
     if found.rods is not None and outside:
@@ -329,13 +286,12 @@ def drop_outside(workbench: Workbench, at: Text) -> dict[str, Any]:
         seen = found.rods
         rods = GrainGuess(seen.id[kept], seen.x[kept], seen.y[kept], seen.radius[kept])
         edits.set_rods(opened.draft, f"{len(outside)} circles outside the walls dropped", rods)
-    return opened.describe()
 
 
 @endpoint
-def classes(workbench: Workbench, at: Text) -> dict[str, Any]:
+def classes(opened: Project) -> dict[str, Any]:
     """Find the radius classes [m] of the rods."""
-    found = _scaled(workbench.project(at))
+    found = _scaled(opened)
     if found.rods is None:
         return {"radii": []}
     pixel = found.scale.mean_size if found.scale is not None else 1.0
@@ -343,14 +299,12 @@ def classes(workbench: Workbench, at: Text) -> dict[str, Any]:
 
 
 @editing_endpoint
-def set_classes(workbench: Workbench, at: Text, radii: Numbers) -> dict[str, Any]:
+def set_classes(opened: Project, radii: Numbers) -> None:
     """Give every rod the nearest of these radii [m]."""
-    opened = workbench.project(at)
     found = _scaled(opened)
     if found.rods is None or found.scale is None or not radii or min(radii) <= 0.0:
         raise InputError("radii", str(radii), "give at least one radius, and detect the rods first")
     edits.set_rods(opened.draft, "radius classes", edits.snapped_to(radii, found.rods, found.scale), radii)
-    return opened.describe()
 
 
 @endpoint
@@ -360,18 +314,16 @@ def materials(workbench: Workbench) -> dict[str, Any]:
 
 @editing_endpoint
 def set_material(
-    workbench: Workbench, at: Text, density: Number | None = None, length: Number | None = None,
+    opened: Project, density: Number | None = None, length: Number | None = None,
     friction: Number | Literal["measured"] | None = None, wall_friction: Number | Literal["same"] | None = None,
     gravity: Point | None = None,
-) -> dict[str, Any]:  # fmt: skip
+) -> None:  # fmt: skip
     """Set the given values; the others are not changed."""
-    opened = workbench.project(at)
     values = {"density": density, "length": length, "friction": friction, "gravity": gravity}
     keys: dict[str, Any] = {f"material.{key}": value for key, value in values.items() if value is not None}
     if wall_friction is not None:
         keys["material.wall_friction"] = None if wall_friction == "same" else wall_friction
     opened.draft.set_keys("material", keys)
-    return opened.describe()
 
 
 def _scaled(opened: Project) -> ValidationResult:
