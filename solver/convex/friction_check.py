@@ -18,6 +18,7 @@ from ..bodies.packing import Packing
 from ..contacts.contacts import Contacts, measure_pairs
 from ..contacts.pairs import join_keys, match_values
 from ..detection.touch_probability import ContactProbabilitySettings, probable_contacts, window_of
+from ..nlgs.chain import ChainSettings, force_scale
 from ..parallel import parallel_map
 from ..quantity import Quantity
 from .dual_prices import ROUNDS, find_missing_pairs
@@ -88,7 +89,6 @@ def check_friction(
     snapshots: Sequence[Snapshot],
     first: int,
     last: int,
-    force_unit: float,
     settings: ContactProbabilitySettings,
     workers: int | None = 1,
 ) -> FrictionCheck:
@@ -98,8 +98,6 @@ def check_friction(
     ----------
     first, last : int
         Frames of the check.
-    force_unit : float
-        Typical contact force [N].
     workers : int, optional
         Threads; the result does not depend on their number.
 
@@ -110,7 +108,7 @@ def check_friction(
     """
     if not 1 <= first <= last < len(snapshots) - 1:
         raise ValueError(f"frames {first} … {last} have no neighbours on both sides in {len(snapshots)} frames")
-    frames = _sliding_frames(packing, snapshots, range(first, last + 1), force_unit, settings, workers)
+    frames = _sliding_frames(packing, snapshots, range(first, last + 1), settings, workers)
     found = estimate_friction(frames, FACTORS, workers=workers)
     given = packing.material.friction
     measured = given * found.factor / BIAS
@@ -138,7 +136,6 @@ def measure_wall_friction(
     snapshots: Sequence[Snapshot],
     first: int,
     last: int,
-    force_unit: float,
     settings: ContactProbabilitySettings,
     workers: int | None = 1,
 ) -> WallFriction | None:
@@ -149,7 +146,7 @@ def measure_wall_friction(
     WallFriction or None
         None with fewer than MIN_WALL_CONTACTS contacts with walls, or if the sliding does not determine the friction.
     """
-    frames = _sliding_frames(packing, snapshots, range(first, last + 1), force_unit, settings, workers)
+    frames = _sliding_frames(packing, snapshots, range(first, last + 1), settings, workers)
     if np.mean([np.count_nonzero(frame.contacts.with_wall) for frame in frames]) < MIN_WALL_CONTACTS:
         return None
     found = estimate_friction(frames, WALL_FACTORS, of_walls=True, workers=workers)
@@ -165,26 +162,18 @@ def _sliding_frames(
     packing: Packing,
     snapshots: Sequence[Snapshot],
     numbers: Sequence[int],
-    force_unit: float,
     settings: ContactProbabilitySettings,
     workers: int | None,
 ) -> list[SlidingFrame]:
-    def make(completed: bool) -> list[SlidingFrame]:
-        return parallel_map(
-            [
-                partial(
-                    sliding_frame, packing.at_frame(snapshots, k), snapshots, k, force_unit, settings,
-                    completed=completed,
-                )
-                for k in numbers
-            ],
-            workers,
-        )  # fmt: skip
+    def make(k: int, completed: bool) -> SlidingFrame:
+        return sliding_frame(packing.at_frame(snapshots, k), snapshots, k, settings, completed=completed)
 
-    return on_better_contacts(make)
+    return on_better_contacts(make, numbers, workers)
 
 
-def on_better_contacts(make: Callable[[bool], list[Frame]]) -> list[Frame]:
+def on_better_contacts(
+    make: Callable[[int, bool], Frame], numbers: Sequence[int], workers: int | None = 1
+) -> list[Frame]:
     """Prepare frames on the detected contacts or, where they explain the sliding clearly better, on completed ones.
 
     One strong contact that was not detected leaves a power gap that a drag of the base or another friction seems to
@@ -194,13 +183,17 @@ def on_better_contacts(make: Callable[[bool], list[Frame]]) -> list[Frame]:
     Parameters
     ----------
     make : callable
-        Prepares the frames on detected contacts, or with True on completed ones.
+        Prepares a frame, given by its number, on detected contacts, or with True on completed ones.
+    numbers : sequence of int
+        The frames.
+    workers : int, optional
+        Threads.
     """
-    detected = make(False)
+    detected = parallel_map([partial(make, k, False) for k in numbers], workers)
     gap = _mean_gap(detected)
     if not gap > QUIET:
         return detected
-    completed = make(True)
+    completed = parallel_map([partial(make, k, True) for k in numbers], workers)
     return completed if is_clearly_less(_mean_gap(completed), gap) else detected
 
 
@@ -217,7 +210,6 @@ def sliding_frame(
     packing: Packing,
     snapshots: Sequence[Snapshot],
     k: int,
-    force_unit: float,
     settings: ContactProbabilitySettings,
     *,
     completed: bool = False,
@@ -231,8 +223,6 @@ def sliding_frame(
     snapshots : sequence of Snapshot
     k : int
         The frame.
-    force_unit : float
-        Typical force [N].
     settings : ContactProbabilitySettings
     completed : bool
         Whether pairs that were not detected, but that the balance shows, are added.
@@ -243,7 +233,7 @@ def sliding_frame(
     )
     walls = packing.walls_of(snapshot)
     for _ in range(ROUNDS if completed else 0):
-        frame = _frame_on(contacts, probability, packing, snapshots, k, force_unit)
+        frame = _frame_on(contacts, probability, packing, snapshots, k)
         none = np.zeros(contacts.count)
         forces = solve_convex_member(frame.balance, frame.slip, probability, none, none)
         solved = frame.balance, [np.column_stack([forces.fn, forces.ft])]
@@ -253,13 +243,13 @@ def sliding_frame(
         joined = join_keys(contacts.key, key)
         probability = match_values(joined, contacts.key, probability) + match_values(joined, key, chance)
         contacts = measure_pairs(packing.grains, snapshot.position, walls, joined)
-    return _frame_on(contacts, probability, packing, snapshots, k, force_unit)
+    return _frame_on(contacts, probability, packing, snapshots, k)
 
 
 def _frame_on(
-    contacts: Contacts, probability: Array, packing: Packing, snapshots: Sequence[Snapshot], k: int, force_unit: float
+    contacts: Contacts, probability: Array, packing: Packing, snapshots: Sequence[Snapshot], k: int
 ) -> SlidingFrame:
-    snapshot = snapshots[k]
+    snapshot, force_unit = snapshots[k], force_scale(packing, ChainSettings())
     walls, friction = packing.walls_of(snapshot), packing.material.friction_at(contacts.with_wall)
     # The power gap does not depend on the scale of the forces, so any total is valid.
     total = None if packing.scale_is_known else force_unit * max(int(contacts.gauge.sum()), 1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from scipy import sparse
@@ -15,7 +14,7 @@ from ..bodies.motion import Snapshot
 from ..bodies.packing import Packing
 from ..contacts.contacts import Contacts
 from ..detection.touch_probability import ContactProbabilitySettings
-from ..parallel import parallel_map
+from ..nlgs.chain import ChainSettings, force_scale
 from .friction_check import LEAST_GAP, MOST_GAP, QUIET, is_clearly_less, on_better_contacts, sliding_frame
 from .program import weigh_rows
 from .sliding_model import Parameter, ResistedFrame, SlidingModel, compare_models, power_gap
@@ -154,7 +153,6 @@ def find_in_sequence(
     packing: Packing,
     snapshots: Sequence[Snapshot],
     first: int,
-    force_unit: float,
     settings: ContactProbabilitySettings,
     workers: int | None = 1,
 ) -> Resistance | None:
@@ -168,15 +166,14 @@ def find_in_sequence(
     numbers = range(first, min(first + COMPARED_FRAMES, len(snapshots) - 1))
     if len(numbers) < FEWEST or packing.material.friction <= 0.0 or packing.material.wall_friction <= 0.0:
         return None
-    frames = resisted_frames(packing, snapshots, numbers, force_unit, settings, workers)
-    return find_resistance(frames, model_of(packing, force_unit), workers)
+    frames = resisted_frames(packing, snapshots, numbers, settings, workers)
+    return find_resistance(frames, model_of(packing), workers)
 
 
 def resisted_frames(
     packing: Packing,
     snapshots: Sequence[Snapshot],
     numbers: Sequence[int],
-    force_unit: float,
     settings: ContactProbabilitySettings,
     workers: int | None = 1,
 ) -> list[ResistedFrame]:
@@ -188,43 +185,34 @@ def resisted_frames(
     snapshots : sequence of Snapshot
     numbers : sequence of int
         Consecutive frames with neighbours on both sides.
-    force_unit : float
-        Typical contact force [N].
     settings : ContactProbabilitySettings
     workers : int, optional
         Threads.
     """
 
-    def make(completed: bool) -> list[ResistedFrame]:
-        return parallel_map(
-            [partial(_resisted_frame, packing, snapshots, k, force_unit, settings, completed) for k in numbers], workers
-        )
+    def make(k: int, completed: bool) -> ResistedFrame:
+        return _resisted_frame(packing, snapshots, k, settings, completed)
 
-    return on_better_contacts(make)
+    return on_better_contacts(make, numbers, workers)
 
 
-def model_of(packing: Packing, force_unit: float) -> SlidingModel:
+def model_of(packing: Packing) -> SlidingModel:
     """The model that a packing states."""
-    material = packing.material
+    material, force_unit = packing.material, force_scale(packing, ChainSettings())
     drag = material.base_drag * float(packing.grains.mass.mean()) / force_unit
     return SlidingModel(material.friction, material.wall_friction, drag)
 
 
-def base_drag_of(packing: Packing, model: SlidingModel, force_unit: float) -> float:
+def base_drag_of(packing: Packing, model: SlidingModel) -> float:
     """Drag of the base [m/s²] under a model: coefficient of friction times gravity."""
-    return model.base_drag * force_unit / float(packing.grains.mass.mean())
+    return model.base_drag * force_scale(packing, ChainSettings()) / float(packing.grains.mass.mean())
 
 
 def _resisted_frame(
-    packing: Packing,
-    snapshots: Sequence[Snapshot],
-    k: int,
-    force_unit: float,
-    settings: ContactProbabilitySettings,
-    completed: bool,
+    packing: Packing, snapshots: Sequence[Snapshot], k: int, settings: ContactProbabilitySettings, completed: bool
 ) -> ResistedFrame:
     free = replace(packing, grains=replace(packing.grains, drag=None, moment=None, moment_sd=None))
-    frame = sliding_frame(free, snapshots, k, force_unit, settings, completed=completed)
+    frame = sliding_frame(free, snapshots, k, settings, completed=completed)
     count = int((snapshots[k].present & packing.grains.free).sum())
     rows = np.ones(len(frame.balance.load))
     rows[2 * count : 3 * count] = TORQUE_WEIGHT

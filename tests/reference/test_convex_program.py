@@ -135,7 +135,7 @@ def test_the_packing_has_what_makes_programs_difficult():
 @pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
 def test_forces_are_the_same_at_the_frames_of_a_simulation(k: int, factor: float):
     packing, snapshots = packing_of(stored_poses())
-    frame = sliding_frame(packing.at_frame(snapshots, k), snapshots, k, UNIT, ContactProbabilitySettings(overlap=5e-6))
+    frame = sliding_frame(packing.at_frame(snapshots, k), snapshots, k, ContactProbabilitySettings(overlap=5e-6))
     balance = replace(frame.balance, friction=factor * frame.balance.friction)
     cost = np.column_stack([balance.friction * np.abs(frame.slip), frame.slip])
     program = Program(balance.friction, cost, np.zeros_like(cost), SETTINGS.history, SETTINGS.balance)

@@ -38,7 +38,6 @@ from ...solver.convex.resistance import (
 from ...solver.convex.sliding_model import Parameter, fit_model
 from ...solver.detection.touch_probability import ContactProbabilitySettings
 from ...solver.frame_forces import FrameForces, FrameStatus
-from ...solver.nlgs.chain import ChainSettings, force_scale
 from ...tracks import Tracks, WallTracks
 from ..corrected_sequence import CorrectedSequence
 from ..snapshots import make_snapshots
@@ -76,13 +75,12 @@ def check_sequence_friction(sequence: CorrectedSequence, frames: Sequence[FrameF
     first = int(starts[np.argmax([quiet[s : s + count].sum() for s in starts])])
     if lost[first - 1 : first + count + 1].mean() > TOLERATED_LOSS:
         return None
-    unit = force_scale(packing, ChainSettings())
     probability = sequence.settings.for_radii(packing.grains.radius).ensemble.probability
-    check = check_friction(packing, snapshots, first, first + count - 1, unit, probability, sequence.settings.workers)
+    check = check_friction(packing, snapshots, first, first + count - 1, probability, sequence.settings.workers)
     if check.sliding < LEAST_SLIDING:
         check = replace(check, enclosed=False)
     elif not check.agrees or check.given_gap > QUIET:
-        check = _beside_others(check, find_in_sequence(packing, snapshots, first, unit, probability))
+        check = _beside_others(check, find_in_sequence(packing, snapshots, first, probability))
     walls = sequence.wall_friction
     if walls is None:
         return check
@@ -116,10 +114,9 @@ def measure_friction(
     frames = _middle_frames(snapshots, CHECKED_FRAMES)
     if not frames:
         raise FrictionError("three photographs are needed to measure it")
-    unit = force_scale(packing, ChainSettings())
     for _ in range(GUESSES):
         guess = replace(packing, material=material.friction_law())
-        found = check_friction(guess, snapshots, frames[0], frames[-1], unit, settings, workers)
+        found = check_friction(guess, snapshots, frames[0], frames[-1], settings, workers)
         if not np.isfinite(found.measured):
             raise FrictionError("nothing slides in these photographs, so they do not determine it: give a number")
         change = abs(found.measured / material.friction - 1.0)
@@ -141,8 +138,7 @@ def measure_friction_of_walls(
     frames = _middle_frames(snapshots, CHECKED_FRAMES)
     if material.wall_friction is not None or len(frames) < FEWEST_FRAMES:
         return None
-    unit = force_scale(packing, ChainSettings())
-    return measure_wall_friction(packing, snapshots, frames[0], frames[-1], unit, settings, workers)
+    return measure_wall_friction(packing, snapshots, frames[0], frames[-1], settings, workers)
 
 
 def refine_wall_friction(
@@ -182,21 +178,19 @@ def measure_resisting(
     error = BaseFrictionError if material.base_friction_measured else FrictionError
     if not numbers:
         raise error("three photographs are needed to measure it")
-    unit = force_scale(packing, ChainSettings())
-    frames = resisted_frames(packing, snapshots, numbers, unit, settings, workers)
+    frames = resisted_frames(packing, snapshots, numbers, settings, workers)
     free: list[Parameter] = ["base_drag"] if material.base_friction_measured else []
     walls = float(np.mean([each.contacts.with_wall.sum() for each in frames]))
     if material.friction_measured:
         own = material.wall_friction is not None or walls < MIN_WALL_CONTACTS
         free.extend(("friction",) if own else ("wall_friction", "friction"))
-    given = model_of(packing, unit)
-    found = fit_model(frames, given, free)
+    found = fit_model(frames, model_of(packing), free)
     if not np.isfinite(found.gap):
         raise error("nothing slides in these photographs, so they do not determine it: give a number")
     if material.base_friction_measured:
         if not packing.scale_is_known:
             raise BaseFrictionError("needs a wall with a known load")
-        drag = base_drag_of(packing, found.model, unit)
+        drag = base_drag_of(packing, found.model)
         material = replace(material, base_friction=drag / material.base_gravity, base_friction_measured=False)
     if "wall_friction" in free and found.enclosed:
         material = replace(material, wall_friction=max(found.model.wall_friction, POSSIBLE[0]))
@@ -227,14 +221,13 @@ def use_unstated(
         or material.friction_measured
     ):
         return material, ""
-    unit = force_scale(packing, ChainSettings())
-    frames = resisted_frames(packing, snapshots, numbers, unit, settings, workers)
+    frames = resisted_frames(packing, snapshots, numbers, settings, workers)
     names = []
     if float(np.mean([each.contacts.with_wall.sum() for each in frames])) >= LEAST_WALLS:
         names.append("wall_friction")
     if packing.scale_is_known and material.base_friction == 0.0 and not material.base_friction_measured:
         names.append("base_friction")
-    given = model_of(packing, unit)
+    given = model_of(packing)
     found = find_unstated(frames, given, names, workers)
     remarks = []
     if found.wall_friction != given.wall_friction:
@@ -243,7 +236,7 @@ def use_unstated(
         )
         material = replace(material, wall_friction=found.wall_friction)
     if found.base_drag != given.base_drag:
-        coefficient = base_drag_of(packing, found, unit) / material.base_gravity
+        coefficient = base_drag_of(packing, found) / material.base_gravity
         remarks.append(f"the base drags the rods as with a friction of {coefficient:.2g}")
         material = replace(material, base_friction=coefficient)
     return material, "; ".join(f"{each}: this is used, unless calibration.resistance is false" for each in remarks)

@@ -9,7 +9,6 @@ import numpy as np
 from ...results.finding import Finding
 from ...solver.convex.friction_check import BIAS
 from ...solver.convex.resistance import COMPARED_FRAMES, Resistance, base_drag_of, find_in_sequence
-from ...solver.nlgs.chain import ChainSettings, force_scale
 from ..corrected_sequence import CorrectedSequence
 from .causes import finding
 from .data_quality import FEW_SLIDING, measure_data_quality
@@ -31,8 +30,7 @@ def examine_resistance(sequence: CorrectedSequence, *, used: bool = False) -> li
     packing, snapshots = sequence.packing, sequence.snapshots
     probability = sequence.settings.for_radii(packing.grains.radius).ensemble.probability
     first = max(1, (len(snapshots) - COMPARED_FRAMES) // 2)
-    unit = force_scale(packing, ChainSettings())
-    found = find_in_sequence(packing, snapshots, first, unit, probability, sequence.settings.workers)
+    found = find_in_sequence(packing, snapshots, first, probability, sequence.settings.workers)
     if found is None or not found.cause or (found.cause == "friction" and sequence.friction_measured):
         return []
     if not _slides(sequence, LEAST_SLIDING.get(found.cause, 0.0)):
@@ -76,5 +74,5 @@ def _coefficient(sequence: CorrectedSequence, found: Resistance) -> str:
     """The coefficient of the base under its usual gravity; empty where no load or weight fixes the scale of forces."""
     if not sequence.packing.scale_is_known:
         return ""
-    drag = base_drag_of(sequence.packing, found.found, force_scale(sequence.packing, ChainSettings()))
+    drag = base_drag_of(sequence.packing, found.found)
     return f", a coefficient of {drag / sequence.base_gravity:.3g}" if np.isfinite(drag) else ""

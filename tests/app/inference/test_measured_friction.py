@@ -36,7 +36,7 @@ def measure(monkeypatch):
     trials: list[float] = []
 
     def by(result, material: RodMaterial | None = None) -> tuple[RodMaterial, list[float]]:
-        def check(packing, snapshots, first, last, unit, settings, workers) -> FrictionCheck:
+        def check(packing, snapshots, first, last, settings, workers) -> FrictionCheck:
             given = packing.material.friction
             trials.append(given)
             measured, enclosed = result(given)
@@ -99,7 +99,7 @@ def test_statistics_are_recomputed_and_less_certain_where_the_motion_contradicts
 def check_solved(monkeypatch):
     """Check the friction of ten solved frames of 2500 contacts; return the frames that are read, and the result."""
 
-    def check(packing, snapshots, first, last, unit, settings, workers) -> FrictionCheck:
+    def check(packing, snapshots, first, last, settings, workers) -> FrictionCheck:
         sliding = slides.pop() if slides else np.nan
         return FrictionCheck(0.25, 0.3, 0.2, 0.4, first, last, True, np.ones(3), np.ones(3), sliding=sliding)
 

@@ -31,7 +31,7 @@ GIVEN = SlidingModel(0.25, 0.25)
 def frames():
     packing, snapshots = sheared_frames(6)
     unit = force_scale(packing, ChainSettings())
-    return packing, unit, resisted_frames(packing, snapshots, range(1, 4), unit, ContactProbabilitySettings(1e-6))
+    return packing, unit, resisted_frames(packing, snapshots, range(1, 4), ContactProbabilitySettings(1e-6))
 
 
 def test_an_attraction_is_a_shift_of_the_normal_forces(frames):
@@ -62,7 +62,7 @@ def test_contacts_that_resist_rolling_turn_both_grains_against_their_relative_ro
 
 
 def test_the_base_drags_against_the_motion(frames):
-    packing, unit, (frame, *_) = frames
+    packing, _, (frame, *_) = frames
     _, snapshots = sheared_frames(6)
     moved = (snapshots[2].position - snapshots[0].position)[snapshots[1].present & packing.grains.free]
     for axis, load in enumerate(frame.drag[: 2 * frame.grain_count].reshape(2, -1)):  # b is minus the force
@@ -74,16 +74,16 @@ def test_the_base_drags_against_the_motion(frames):
     assert (size <= share * (1.0 + 1e-9)).all()
     assert size.max() > 0.5
     material = replace(packing.material, base_drag=3.0)
-    assert base_drag_of(packing, model_of(replace(packing, material=material), unit), unit) == pytest.approx(3.0)
+    assert base_drag_of(packing, model_of(replace(packing, material=material))) == pytest.approx(3.0)
 
 
 def test_a_drag_grows_with_the_mass_and_fades_where_the_motion_is_noise(frames):
-    packing, unit, _ = frames
+    packing, _, _ = frames
     _, snapshots = sheared_frames(6)
     mass = packing.grains.mass * np.linspace(0.5, 1.5, packing.grains.count)
     heavy = replace(packing, grains=replace(packing.grains, mass=mass))
     noisy = [replace(each, sigma=3e-5) for each in snapshots]
-    (frame,) = resisted_frames(heavy, noisy, [2], unit, ContactProbabilitySettings(1e-6))
+    (frame,) = resisted_frames(heavy, noisy, [2], ContactProbabilitySettings(1e-6))
     moved = noisy[3].position - noisy[1].position
     expected = (mass / mass.mean() / np.sqrt((moved**2).sum(axis=1) + 4.0 * 3e-5**2))[:, None] * moved
     np.testing.assert_allclose(frame.drag[: 2 * frame.grain_count].reshape(2, -1).T, expected)
@@ -94,7 +94,7 @@ def test_a_frame_has_light_torques_no_stated_drag_and_the_sliding_around_it(fram
     _, snapshots = sheared_frames(6)
     drag = np.ones((packing.grains.count, 2))
     based = replace(packing, grains=replace(packing.grains, drag=drag))
-    (frame,) = resisted_frames(based, snapshots, [2], unit, ContactProbabilitySettings(1e-6))
+    (frame,) = resisted_frames(based, snapshots, [2], ContactProbabilitySettings(1e-6))
     walls = packing.walls_of(snapshots[2])
     plain = assemble_balance(
         frame.contacts, packing.grains, walls, present=snapshots[2].present, friction=frame.balance.friction,
@@ -331,10 +331,10 @@ def test_walls_need_contacts_and_a_friction_limits(frames, monkeypatch):
 
 def test_nothing_is_compared_without_friction_or_with_too_few_photographs():
     packing, snapshots = sheared_frames(6)
-    unit, settings = force_scale(packing, ChainSettings()), ContactProbabilitySettings(1e-6)
+    settings = ContactProbabilitySettings(1e-6)
     smooth = replace(packing, material=replace(packing.material, wall_friction=0.0))
-    assert find_in_sequence(smooth, snapshots, 1, unit, settings) is None
-    assert find_in_sequence(packing, snapshots, 4, unit, settings) is None
+    assert find_in_sequence(smooth, snapshots, 1, settings) is None
+    assert find_in_sequence(packing, snapshots, 4, settings) is None
 
 
 def test_a_motion_that_fits_in_reverse_order_is_named_first(frames, monkeypatch):
@@ -379,5 +379,4 @@ def test_without_friction_nothing_is_compared(material, monkeypatch):
     packing, snapshots = sheared_frames(8)
     monkeypatch.setattr(resistance, "resisted_frames", lambda *_: pytest.fail("it was compared"))
     smooth = replace(packing, material=replace(packing.material, **material))
-    unit = force_scale(packing, ChainSettings())
-    assert find_in_sequence(smooth, snapshots, 1, unit, ContactProbabilitySettings(1e-6)) is None
+    assert find_in_sequence(smooth, snapshots, 1, ContactProbabilitySettings(1e-6)) is None
