@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from ...solver.bodies.grains import Array
 from ...tracks import Tracks, TrackStatus
 
 MAX_ID = 2**53
+AXES = "xyz"  # of other programs
 MAX_DEPTH = 0.5  # [mean diameter] of the centres of a layer
 RADIUS_VARIATION = 0.02  # relative, of a grain's radius over the frames, above which a remark is made
 
@@ -36,6 +38,20 @@ class Observations:
 
     def with_remark(self, remark: str) -> Observations:
         return replace(self, remarks=(*self.remarks, remark))
+
+
+def read_axes(columns: Mapping[str, str], program: str) -> tuple[str, str, str]:
+    """Return the axes of another program that are x and y here, and the third one. Raises InputError."""
+    across, up = (columns.get(role, role) for role in "xy")
+    for axis in (across, up):
+        if axis not in tuple(AXES):
+            raise InputError("--columns", axis, f"is not an axis of {program}: x, y or z")
+    return across, up, next(axis for axis in AXES if axis not in (across, up))
+
+
+def turned_to_observer(rotation: Array, axes: tuple[str, str, str]) -> Array:
+    """Return rotations about the third axis as seen here: reversed where it points away from the observer."""
+    return -rotation if axes[:2] in (("x", "z"), ("y", "x"), ("z", "y")) else rotation
 
 
 def layer_remarks(axis: str, depth: Array, radius: Array) -> list[str]:

@@ -33,6 +33,7 @@ DISTANT = 1.5  # sums of radii between centres, above which discs cannot touch
 MOSTLY = 0.5  # of the forces of a frame, above which its ids are wrong
 COPY_DIGITS = 1e-6  # relative difference of copies: that of their rounding
 LEAST_COPIES = 4  # rows
+TRUTH_COLUMNS = ("frame", "i", "j", "fn", "ft", "fn_i", "fn_j")
 WALL = -1  # instead of the other disc
 NORMAL, TANGENTIAL = "_NormWeightedAdjacencyMatrix.dlm", "_TanWeightedAdjacencyMatrix.dlm"
 POSITIONS, CONTACTS = "particle_positions.txt", "Adjacency_list.txt"
@@ -50,6 +51,10 @@ class ForceReadings:
     other: Int[np.ndarray, " s"]  # WALL: a wall, which the file does not name
     fn: Float[Array, " s"]  # [N]
     ft: Float[Array, " s"]  # [N], in the sign convention of the program
+
+    def select(self, kept: NDArray[np.bool_]) -> ForceReadings:
+        """Return some of the readings."""
+        return ForceReadings(*(getattr(self, each.name)[kept] for each in fields(ForceReadings)))
 
 
 def read_pegs(folder: Path) -> tuple[Observations, ForceReadings]:
@@ -103,8 +108,7 @@ def without_copies(readings: ForceReadings) -> tuple[ForceReadings, str]:
     if twice.sum() < LEAST_COPIES or differs[twice].any():
         return readings, ""
     kept = ~twice | (readings.disc < readings.other)
-    one = ForceReadings(*(getattr(readings, each.name)[kept] for each in fields(ForceReadings)))
-    return one, (
+    return readings.select(kept), (
         f"The forces of {state_count(int(twice.sum()) // 2, 'contact')} are given twice and are equal: copies, not two "
         "readings. Their error is unknown."
     )
@@ -125,7 +129,7 @@ def true_contacts(readings: ForceReadings, imported: ImportedTracks) -> dict[str
         low, high = sorted((int(disc), int(other)))
         both = readings_by_contact.setdefault((row[int(frame)], low, high), [None, None])
         both[int(disc != low)] = (float(fn), float(ft))
-    columns: dict[str, list[object]] = {name: [] for name in ("frame", "i", "j", "fn", "ft", "fn_i", "fn_j")}
+    columns: dict[str, list[object]] = {name: [] for name in TRUTH_COLUMNS}
     for (frame, low, high), both in sorted(readings_by_contact.items()):
         known = [reading for reading in both if reading is not None]
         mean = np.mean(known, axis=0)
@@ -153,8 +157,9 @@ def without_distant(readings: ForceReadings, imported: ImportedTracks) -> tuple[
     wrong = np.flatnonzero(count > MOSTLY * of[: len(count)])
     mostly = f" Most of them are in frames {', '.join(map(str, wrong))}: ids of positions and forces differ there." if (
         len(wrong)) else ""  # fmt: skip
-    kept = ForceReadings(*(getattr(readings, each.name)[~distant] for each in fields(ForceReadings)))
-    return kept, f"Left out: {state_count(int(distant.sum()), 'force')} between discs that lie apart.{mostly}"
+    return readings.select(
+        ~distant
+    ), f"Left out: {state_count(int(distant.sum()), 'force')} between discs that lie apart.{mostly}"
 
 
 def true_wall_forces(
@@ -165,7 +170,7 @@ def true_wall_forces(
     The program names no walls: a force belongs to the wall that is nearest to its disc. Forces of a disc that touches
     two walls in a photograph are ambiguous.
     """
-    columns: dict[str, list[object]] = {name: [] for name in ("frame", "i", "j", "fn", "ft", "fn_i", "fn_j")}
+    columns: dict[str, list[object]] = {name: [] for name in TRUTH_COLUMNS}
     at_wall = np.flatnonzero(readings.other == WALL)
     if walls is None or not len(at_wall):
         left = (
@@ -200,7 +205,7 @@ def _read_by_photograph(files: list[Path]) -> tuple[Observations, ForceReadings]
         parts.append(discs[:, :4])
         frames.append(np.full(len(discs), frame, np.int64))
         lines += range(1, len(discs) + 1)
-        ids = _ids(file, discs[:, 0])
+        ids = _whole_numbers(file, discs[:, 0], "id")
         found = _read_matrices(file.parent, stem, len(ids))
         if found is None:
             found = _read_bonds(file.parent / f"{stem}{BONDS}", len(ids))
@@ -239,7 +244,7 @@ def _keep_between_two(readings: ForceReadings, remarks: list[str]) -> ForceReadi
     own = readings.disc == readings.other
     if own.any():
         remarks.append(f"Left out: {state_count(int(own.sum()), 'force')} of discs on themselves.")
-        readings = ForceReadings(*(getattr(readings, each.name)[~own] for each in fields(ForceReadings)))
+        readings = readings.select(~own)
     readings, remark = without_copies(readings)
     remarks += [remark] if remark else []
     return readings
@@ -304,10 +309,9 @@ def _join_readings(parts: list[ForceReadings]) -> ForceReadings:
     if not parts:
         none = np.empty(0, np.int64)
         return ForceReadings(none, none, none, np.empty(0), np.empty(0))
-    frame, disc, other, fn, ft = (
-        np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(ForceReadings)
+    return ForceReadings(
+        *(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(ForceReadings))
     )
-    return ForceReadings(frame, disc, other, fn, ft)
 
 
 def _numbers(file: Path, least: int) -> Array:
@@ -330,10 +334,6 @@ def _numbers(file: Path, least: int) -> Array:
     if not len(table):
         raise InputError(file, "", "has no rows")
     return table
-
-
-def _ids(file: Path, values: Array) -> NDArray[np.int64]:
-    return _whole_numbers(file, values, "id")
 
 
 def _whole_numbers(file: Path, values: Array, what: str) -> NDArray[np.int64]:

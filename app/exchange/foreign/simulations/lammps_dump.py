@@ -18,7 +18,7 @@ from ....experiment.reading.tables import Table
 from ....process.errors import InputError
 from ....solver.bodies.grains import Array
 from ..foreign_table import read_text
-from ..observations import Observations, layer_remarks
+from ..observations import Observations, layer_remarks, read_axes, turned_to_observer
 
 COORDINATES = {  # names of a coordinate, the best first; the last two are fractions of the box
     "x": ("x", "xu", "xs", "xsu"), "y": ("y", "yu", "ys", "ysu"), "z": ("z", "zu", "zs", "zsu"),
@@ -72,11 +72,7 @@ def read_lammps(source: Path, columns: Mapping[str, str], interval: float) -> Du
     if not steps:
         raise InputError(source, "", "contains no ITEM: TIMESTEP")
     ordered = [steps[number] for number in sorted(steps)]
-    axes = tuple(columns.get(role, role) for role in "xy")
-    for axis in axes:
-        if axis not in COORDINATES:
-            raise InputError("--columns", axis, "is not an axis of a dump: x, y or z")
-    third = next(axis for axis in "xyz" if axis not in axes)
+    *axes, third = all_axes = read_axes(columns, "a dump")
     velocity = ANGULAR_VELOCITIES[third]
     frames, names, lines, position, radius, angle, spin, depth = [], [], [], [], [], [], [], []
     for step in ordered:
@@ -100,8 +96,7 @@ def read_lammps(source: Path, columns: Mapping[str, str], interval: float) -> Du
         remarks.append(
             f"Rotations are {velocity} integrated over the dumped steps, which is coarse if grains rotated in between."
         )
-    if (axes[0], axes[1]) in (("x", "z"), ("y", "x"), ("z", "y")):
-        rotation = -rotation  # the third axis points away from the observer
+    rotation = turned_to_observer(rotation, all_axes)
     known = joined(radius)
     remarks += layer_remarks(third, joined(depth), known)
     k = ["xyz".index(axis) for axis in axes]

@@ -17,22 +17,17 @@ from ....experiment.reading.tables import Table
 from ....process.errors import InputError
 from ....solver.bodies.grains import Array
 from ..foreign_table import read_text
-from ..observations import Observations, layer_remarks
+from ..observations import AXES, Observations, layer_remarks, read_axes, turned_to_observer
 
 FSTAT = ".fstat"
 FORCE_CELLS = 16
 SAME_TIME = 1e-6  # relative to the time between blocks
-AXES = "xyz"
 
 
 def read_mercury(source: Path, columns: Mapping[str, str]) -> Observations:
     """Read a .data file; columns: `x` and `y` may name other axes, such as y=z. Raises InputError."""
-    axes = [columns.get(role, role) for role in "xy"]
-    for axis in axes:
-        if axis not in AXES:
-            raise InputError("--columns", axis, "is not an axis of MercuryDPM: x, y or z")
+    *axes, third = all_axes = read_axes(columns, "MercuryDPM")
     frames, names, times, position, radius, depth, angle, spin, lines = [], [], [], [], [], [], [], [], []
-    third = next(axis for axis in AXES if axis not in axes)
     for frame, (line, time, table) in enumerate(_blocks(source)):
         flat = table.shape[1] == 8
         if flat and axes != ["x", "y"]:
@@ -52,8 +47,7 @@ def read_mercury(source: Path, columns: Mapping[str, str]) -> Observations:
         raise InputError(source, "", "contains no particles")
     joined = np.concatenate
     rotation, remarks = _rotation(angle, spin)
-    if (axes[0], axes[1]) in (("x", "z"), ("y", "x"), ("z", "y")):
-        rotation = -rotation  # the third axis points away from the observer
+    rotation = turned_to_observer(rotation, all_axes)
     remarks += layer_remarks(third, joined(depth), joined(radius))
     return Observations(
         Table(source, {"id": names}, lines), "id", joined(frames), tuple(names), joined(position), rotation,

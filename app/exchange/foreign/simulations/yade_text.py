@@ -15,18 +15,14 @@ from ....experiment.reading.tables import Table
 from ....process.errors import InputError
 from ....solver.bodies.grains import Array
 from ..foreign_table import read_text
-from ..observations import Observations, layer_remarks
+from ..observations import AXES, Observations, layer_remarks, read_axes
 
 PLAIN = "x_y_z_r"
-AXES = ("x", "y", "z")
 
 
 def read_yade(source: Path, columns: Mapping[str, str]) -> Observations:
     """Read a file or a folder of files; columns: `x` and `y` may name other axes. Raises InputError."""
-    axes = tuple(columns.get(role, role) for role in "xy")
-    for axis in axes:
-        if axis not in AXES:
-            raise InputError("--columns", axis, "is not an axis of YADE: x, y or z")
+    *axes, third = read_axes(columns, "YADE")
     files = (
         sorted((each for each in source.iterdir() if each.is_file()), key=natural_key) if source.is_dir() else [source]
     )
@@ -34,7 +30,6 @@ def read_yade(source: Path, columns: Mapping[str, str]) -> Observations:
         raise InputError(source, "", "is an empty folder")
     frames, names, position, radius, lines, left = [], [], [], [], [], set()
     depth: list[Array] = []
-    third = next(axis for axis in AXES if axis not in axes)
     for frame, file in enumerate(files):
         text = read_text(file)
         found, line = _read_vtk(file, text) if text.startswith("# vtk") else _read_text(file, text)
