@@ -6,68 +6,48 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
+from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg
 
 from ..process.errors import InputError
 from ..process.frame_range import FrameRange
 
+Flag = Annotated[bool, FlagCreatePairsOff]
 ExperimentPath = Annotated[
-    Path,
-    tyro.conf.Positional,
-    tyro.conf.arg(metavar="EXPERIMENT", help="folder of the experiment, or its experiment.toml"),
+    Path, Positional, arg(metavar="EXPERIMENT", help="folder of the experiment, or its experiment.toml")
 ]
-Out = Annotated[Path | None, tyro.conf.arg(metavar="DIR", help="folder of the results; default runs/<name>")]
+Out = Annotated[Path | None, arg(metavar="DIR", help="folder of the results; default runs/<name>")]
 Settings = Annotated[
     tuple[str, ...],
-    tyro.conf.UseAppendAction,
-    tyro.conf.arg(
+    UseAppendAction,
+    arg(
         name="set",
         metavar="KEY=VALUE",
         help="override a key of experiment.toml, e.g. solver.kappa=0.1; rodsight settings lists them",
     ),
 ]
-KeepOld = Annotated[
-    bool,
-    tyro.conf.FlagCreatePairsOff,
-    tyro.conf.arg(help="use stored results of the same input as they are, although other code made them"),
-]
-Frames = Annotated[
-    str | None, tyro.conf.arg(metavar="A:B[:STEP]", help="only the frames A … B − 1, or every STEP-th of them")
-]
-AsJson = Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(name="json", help="print JSON")]
+KeepOld = Annotated[Flag, arg(help="use stored results of the same input as they are, although other code made them")]
+Frames = Annotated[str | None, arg(metavar="A:B[:STEP]", help="only the frames A … B − 1, or every STEP-th of them")]
+AsJson = Annotated[Flag, arg(name="json", help="print JSON")]
 ProgressForm = Annotated[
     Literal["bars", "lines"],
-    tyro.conf.arg(name="progress", help="lines: as JSON on standard error, for programs; default bars, on a terminal"),
+    arg(name="progress", help="lines: as JSON on standard error, for programs; default bars, on a terminal"),
 ]
-Workers = Annotated[int | None, tyro.conf.arg(metavar="N", help="processes; default: one per core")]
-Threads = Annotated[
-    int | None, tyro.conf.arg(metavar="N", help="threads of tracking and solving; default: one per core")
-]
-Scheduler = Annotated[
-    str | None, tyro.conf.arg(metavar="ADDRESS", help="run on the machines of this dask scheduler instead")
-]
-Port = Annotated[int, tyro.conf.arg(help="of the page on 127.0.0.1; 0: a free one")]
-Browser = Annotated[bool, tyro.conf.arg(help="open the page")]
-ResultsPath = Annotated[
-    Path, tyro.conf.Positional, tyro.conf.arg(metavar="RESULTS", help="a run's folder, or results.h5")
-]
-Quiet = Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="show no progress and no table")]
-Sweeps = Annotated[
-    Literal["all", "log", "none"] | None, tyro.conf.arg(help="sweeps whose forces are recorded; default log")
-]
+Workers = Annotated[int | None, arg(metavar="N", help="processes; default: one per core")]
+Threads = Annotated[int | None, arg(metavar="N", help="threads of tracking and solving; default: one per core")]
+Scheduler = Annotated[str | None, arg(metavar="ADDRESS", help="run on the machines of this dask scheduler instead")]
+Port = Annotated[int, arg(help="of the page on 127.0.0.1; 0: a free one")]
+Browser = Annotated[bool, arg(help="open the page")]
+ResultsPath = Annotated[Path, Positional, arg(metavar="RESULTS", help="a run's folder, or results.h5")]
+Quiet = Annotated[Flag, arg(help="show no progress and no table")]
+Sweeps = Annotated[Literal["all", "log", "none"] | None, arg(help="sweeps whose forces are recorded; default log")]
 
 Ensemble = Annotated[
-    int | None,
-    tyro.conf.arg(metavar="K", help="error bars from K solutions with resampled inputs; 8 are enough"),
+    int | None, arg(metavar="K", help="error bars from K solutions with resampled inputs; 8 are enough")
 ]
-MaxSize = Annotated[
-    float | None, tyro.conf.arg(metavar="MB", help="of the recording [MB]; sweeps are thinned to stay below it")
-]
+MaxSize = Annotated[float | None, arg(metavar="MB", help="of the recording [MB]; sweeps are thinned to stay below it")]
 FullFrames = Annotated[
     tuple[int, ...],
-    tyro.conf.arg(
-        metavar="FRAME", help="with --sweeps all: every sweep of these frames in a side file, others thinned"
-    ),
+    arg(metavar="FRAME", help="with --sweeps all: every sweep of these frames in a side file, others thinned"),
 ]
 
 

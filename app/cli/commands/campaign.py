@@ -6,11 +6,11 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import tyro
+from tyro.conf import Positional, arg
 
 from ...process.counts import state_count
 from ...process.errors import RunError
-from ..arguments import AsJson, Quiet, Scheduler, Workers, worker_count
+from ..arguments import AsJson, Flag, Quiet, Scheduler, Workers, worker_count
 from ..terminal import print_line, progress_of, table_console
 
 if TYPE_CHECKING:
@@ -21,19 +21,19 @@ if TYPE_CHECKING:
 def campaign(
     table: Annotated[
         Path,
-        tyro.conf.Positional,
-        tyro.conf.arg(
+        Positional,
+        arg(
             metavar="TABLE", help="CSV: column experiment (a folder, or a pattern of folders), keys of experiment.toml"
         ),
     ],
     /,
     out: Annotated[
-        Path | None, tyro.conf.arg(metavar="DIR", help="folder of all runs; default: runs/ and the table's name")
+        Path | None, arg(metavar="DIR", help="folder of all runs; default: runs/ and the table's name")
     ] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
-    recordings: Annotated[bool, tyro.conf.arg(help="write a recording of every run")] = True,
-    dry: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="check the table and list its runs")] = False,
+    recordings: Annotated[bool, arg(help="write a recording of every run")] = True,
+    dry: Annotated[Flag, arg(help="check the table and list its runs")] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> int:

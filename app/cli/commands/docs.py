@@ -7,23 +7,18 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated
 
-import tyro
+from tyro.conf import Positional, arg
 
 from ...process.errors import InputError
+from ..arguments import Flag
 
 
 def docs(
-    page: Annotated[
-        str | None, tyro.conf.Positional, tyro.conf.arg(metavar="PAGE", help="to open, such as troubleshooting")
-    ] = None,
+    page: Annotated[str | None, Positional, arg(metavar="PAGE", help="to open, such as troubleshooting")] = None,
     /,
-    text: Annotated[
-        bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="print the page here instead of opening it")
-    ] = False,
-    find: Annotated[
-        str | None, tyro.conf.arg(metavar="WORDS", help="list the sections that contain these words")
-    ] = None,
-    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help="write the pages there")] = None,
+    text: Annotated[Flag, arg(help="print the page here instead of opening it")] = False,
+    find: Annotated[str | None, arg(metavar="WORDS", help="list the sections that contain these words")] = None,
+    out: Annotated[Path | None, arg(metavar="DIR", help="write the pages there")] = None,
 ) -> int:
     """Open the documentation in the browser: the installed pages, without a network.
 

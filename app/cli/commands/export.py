@@ -5,55 +5,51 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
 from rich.console import Console
+from tyro.conf import Positional, arg
 
 from ...exported_files import ExportKind, TableForm, Timeline, check_options
 from ...process.counts import state_count
 from ...process.errors import InputError
-from ..arguments import Frames, Quiet, parse_frames, refuse_step, refuse_unused
+from ..arguments import Flag, Frames, Quiet, parse_frames, refuse_step, refuse_unused
 from ..stored_results import recording_file, results_file, warn_out_of_date
 from ..terminal import print_line, progress_of
 
 
 def export(
-    what: Annotated[ExportKind, tyro.conf.Positional, tyro.conf.arg(help="to write")],
-    source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RESULTS", help="a run's folder or file")],
+    what: Annotated[ExportKind, Positional, arg(help="to write")],
+    source: Annotated[Path, Positional, arg(metavar="RESULTS", help="a run's folder or file")],
     /,
     out: Annotated[
-        Path | None, tyro.conf.arg(metavar="PATH", help="folder, or file of a video; default: beside the results")
+        Path | None, arg(metavar="PATH", help="folder, or file of a video; default: beside the results")
     ] = None,
-    kind: Annotated[TableForm | None, tyro.conf.arg(help="tables: format; default csv")] = None,
-    frames: Annotated[str | None, tyro.conf.arg(metavar="A:B", help="pictures, video: of the timeline")] = None,
-    timeline: Annotated[
-        Timeline | None, tyro.conf.arg(help="pictures, video: from picture to picture; default frame")
-    ] = None,
-    step: Annotated[int | None, tyro.conf.arg(help="pictures, video: every so many values; default 1")] = None,
-    tab: Annotated[str | None, tyro.conf.arg(help="pictures, video: the tab to show; default Forces")] = None,
-    view: Annotated[str | None, tyro.conf.arg(help="pictures, video: one view alone, by its title")] = None,
+    kind: Annotated[TableForm | None, arg(help="tables: format; default csv")] = None,
+    frames: Annotated[str | None, arg(metavar="A:B", help="pictures, video: of the timeline")] = None,
+    timeline: Annotated[Timeline | None, arg(help="pictures, video: from picture to picture; default frame")] = None,
+    step: Annotated[int | None, arg(help="pictures, video: every so many values; default 1")] = None,
+    tab: Annotated[str | None, arg(help="pictures, video: the tab to show; default Forces")] = None,
+    view: Annotated[str | None, arg(help="pictures, video: one view alone, by its title")] = None,
     figure: Annotated[
         Literal["forces", "density", "rose", "stress", "time", "sheet", "kinematics", "fringes", "truth", "difference"]
         | None,
-        tyro.conf.arg(help="pictures, video: this figure of every frame, instead of the viewer"),
+        arg(help="pictures, video: this figure of every frame, instead of the viewer"),
     ] = None,
     size: Annotated[
-        str | None, tyro.conf.arg(metavar="WxH", help="pictures, video: of the window [px]; default 1600x1000")
+        str | None, arg(metavar="WxH", help="pictures, video: of the window [px]; default 1600x1000")
     ] = None,
-    rate: Annotated[float | None, tyro.conf.arg(help="video: pictures a second [1/s]; default 6")] = None,
-    pixel_size: Annotated[
-        float | None, tyro.conf.arg(help="dic: side of a pixel [m]; default: the experiment's")
-    ] = None,
-    frame: Annotated[int | None, tyro.conf.arg(help="figures: of this frame; default: the last settled one")] = None,
+    rate: Annotated[float | None, arg(help="video: pictures a second [1/s]; default 6")] = None,
+    pixel_size: Annotated[float | None, arg(help="dic: side of a pixel [m]; default: the experiment's")] = None,
+    frame: Annotated[int | None, arg(help="figures: of this frame; default: the last settled one")] = None,
     formats: Annotated[
-        tuple[Literal["pdf", "svg", "png"], ...], tyro.conf.arg(help="figures: kinds of files; default pdf svg")
+        tuple[Literal["pdf", "svg", "png"], ...], arg(help="figures: kinds of files; default pdf svg")
     ] = (),
     width: Annotated[
         Literal["single", "double"] | None,
-        tyro.conf.arg(help="figures: columns of a page; default single, of the set paper double"),
+        arg(help="figures: columns of a page; default single, of the set paper double"),
     ] = None,
     figure_set: Annotated[
         Literal["results", "paper"] | None,
-        tyro.conf.arg(
+        arg(
             name="set",
             help="figures: of the results, or those of the paper: apparatus, frames from zero forces, consecutive "
             "networks, P(f) and stress against recorded ones; default results",
@@ -119,22 +115,18 @@ def export(
 def share(
     source: Annotated[
         Path | None,
-        tyro.conf.Positional,
-        tyro.conf.arg(metavar="RECORDING_OR_DIR", help="a recording, a run's folder, or with --html a folder of runs"),
+        Positional,
+        arg(metavar="RECORDING_OR_DIR", help="a recording, a run's folder, or with --html a folder of runs"),
     ] = None,
     /,
     frames: Frames = None,
-    scale: Annotated[float, tyro.conf.arg(help="of photographs, 0.5: half as wide and high")] = 1.0,
-    html: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="one page with the viewer in it")] = False,
+    scale: Annotated[float, arg(help="of photographs, 0.5: half as wide and high")] = 1.0,
+    html: Annotated[Flag, arg(help="one page with the viewer in it")] = False,
     although_out_of_date: Annotated[
-        bool,
-        tyro.conf.FlagCreatePairsOff,
-        tyro.conf.arg(help="share a run although its input has changed since it was computed"),
+        Flag, arg(help="share a run although its input has changed since it was computed")
     ] = False,
-    repair: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help="repair a damaged recording instead")] = None,
-    out: Annotated[
-        Path | None, tyro.conf.arg(metavar="FILE", help="file to write; default: beside the recording")
-    ] = None,
+    repair: Annotated[Path | None, arg(metavar="FILE", help="repair a damaged recording instead")] = None,
+    out: Annotated[Path | None, arg(metavar="FILE", help="file to write; default: beside the recording")] = None,
 ) -> int:
     """Make a small recording to send, or one HTML file that any browser opens.
 

@@ -6,13 +6,13 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import tyro
 from rich.console import Console
+from tyro.conf import Positional, arg
 
 from ...exchange.foreign.format_names import FileFormat
 from ...process.counts import state_count
 from ...process.errors import InputError
-from ..arguments import Quiet
+from ..arguments import Flag, Quiet
 from ..terminal import print_line
 
 if TYPE_CHECKING:
@@ -23,38 +23,35 @@ if TYPE_CHECKING:
 def import_(
     form: Annotated[
         FileFormat,
-        tyro.conf.Positional,
-        tyro.conf.arg(
+        Positional,
+        arg(
             help="table: of any tracker, by --columns; trackpy, trackmate, rodtracker: trackers; lammps (and "
             "LIGGGHTS), yade, mercury: simulations; pegs: photoelastic discs with their forces; dic: dic_out_N.txt "
             "or CONFNNNN"
         ),
     ],
-    source: Annotated[
-        Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE", help="to read, or a folder, depending on the form")
-    ],
-    out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER", help="of the new experiment")],
+    source: Annotated[Path, Positional, arg(metavar="FILE", help="to read, or a folder, depending on the form")],
+    out: Annotated[Path, Positional, arg(metavar="FOLDER", help="of the new experiment")],
     /,
     columns: Annotated[
         str | None,
-        tyro.conf.arg(
+        arg(
             metavar="frame=…,id=…,x=…,y=…[,theta=…,radius=…]",
             help="names of the columns, or their numbers from 1; also diameter=…, time=…; overrides those of the form",
         ),
     ] = None,
-    pixel_size: Annotated[float | None, tyro.conf.arg(help="the file's unit of length [m]; default: metres")] = None,
-    y_down: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="y points down, as in pictures")] = False,
+    pixel_size: Annotated[float | None, arg(help="the file's unit of length [m]; default: metres")] = None,
+    y_down: Annotated[Flag, arg(help="y points down, as in pictures")] = False,
     height: Annotated[
-        float | None,
-        tyro.conf.arg(help="of a photograph [px]; y is measured up from its last row; default: from the highest y"),
+        float | None, arg(help="of a photograph [px]; y is measured up from its last row; default: from the highest y")
     ] = None,
-    degrees: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="theta is in degrees")] = False,
-    radius: Annotated[float | None, tyro.conf.arg(help="of all grains without one, in the file's unit")] = None,
-    interval: Annotated[float, tyro.conf.arg(help="between photographs, or of a step [s]")] = 1.0,
-    precision: Annotated[float | None, tyro.conf.arg(help="of a position, in the file's unit")] = None,
+    degrees: Annotated[Flag, arg(help="theta is in degrees")] = False,
+    radius: Annotated[float | None, arg(help="of all grains without one, in the file's unit")] = None,
+    interval: Annotated[float, arg(help="between photographs, or of a step [s]")] = 1.0,
+    precision: Annotated[float | None, arg(help="of a position, in the file's unit")] = None,
     walls: Annotated[
         str | None,
-        tyro.conf.arg(
+        arg(
             metavar="box|outer|none|FILE",
             help="box: four bars proposed at the outermost grains; outer: those grains are the boundary; "
             "FILE: frame,wall,x1,y1,x2,y2 in the file's unit",
@@ -62,21 +59,19 @@ def import_(
     ] = None,
     corner_radius: Annotated[
         float | None,
-        tyro.conf.arg(
+        arg(
             help="dic: of the discs at the frame's corners, in the file's unit; default: the largest that overlaps no "
             "rod"
         ),
     ] = None,
-    pressure: Annotated[
-        tuple[str, ...], tyro.conf.arg(metavar="WALL=PA", help="pressure on walls [Pa], such as top=50e3")
-    ] = (),
+    pressure: Annotated[tuple[str, ...], arg(metavar="WALL=PA", help="pressure on walls [Pa], such as top=50e3")] = (),
     load: Annotated[
         tuple[str, ...],
-        tyro.conf.arg(metavar="WALL=N", help="measured load on walls [N], such as top=1438; load.csv, to be edited"),
+        arg(metavar="WALL=N", help="measured load on walls [N], such as top=1438; load.csv, to be edited"),
     ] = (),
     pairs: Annotated[
         Path | None,
-        tyro.conf.arg(
+        arg(
             metavar="FILE",
             help="pair forces of a simulation [N] as truth: dump local, .fstat, or a table frame,i,j,fx,fy; names by "
             "--columns",

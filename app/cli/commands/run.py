@@ -9,8 +9,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
 from rich.console import Console
+from tyro.conf import arg
 
 from ...process.counts import state_count
 from ...process.errors import InputError
@@ -18,6 +18,7 @@ from ..arguments import (
     AsJson,
     Ensemble,
     ExperimentPath,
+    Flag,
     Frames,
     FullFrames,
     KeepOld,
@@ -43,7 +44,7 @@ def run(
     /,
     out: Out = None,
     view: Annotated[
-        Literal["none", "native", "web"], tyro.conf.arg(help="watch while it is solved: in a window, in a browser")
+        Literal["none", "native", "web"], arg(help="watch while it is solved: in a window, in a browser")
     ] = "none",
     sweeps: Sweeps = None,
     max_size: MaxSize = None,
@@ -54,13 +55,10 @@ def run(
     workers: Threads = None,
     progress: ProgressForm = "bars",
     follow: Annotated[
-        bool,
-        tyro.conf.FlagCreatePairsOff,
-        tyro.conf.arg(help="wait for further photographs and solve them as they arrive, then run as usual"),
+        Flag, arg(help="wait for further photographs and solve them as they arrive, then run as usual")
     ] = False,
     idle: Annotated[
-        float | None,
-        tyro.conf.arg(metavar="SECONDS", help="end after this time without a photograph [s]; for --follow"),
+        float | None, arg(metavar="SECONDS", help="end after this time without a photograph [s]; for --follow")
     ] = None,
     keep_old: KeepOld = False,
     as_json: AsJson = False,
@@ -111,7 +109,7 @@ def check(
     experiment: ExperimentPath,
     /,
     budget: Annotated[
-        bool, tyro.conf.arg(help="predict the accuracy of the forces from the first photographs or their tracks")
+        bool, arg(help="predict the accuracy of the forces from the first photographs or their tracks")
     ] = True,
     settings: Settings = (),
     as_json: AsJson = False,
@@ -143,11 +141,7 @@ def track(
     /,
     out: Out = None,
     frames: Frames = None,
-    report: Annotated[
-        bool,
-        tyro.conf.FlagCreatePairsOff,
-        tyro.conf.arg(help="write DIR/tracking_report.html on the quality of tracking"),
-    ] = False,
+    report: Annotated[Flag, arg(help="write DIR/tracking_report.html on the quality of tracking")] = False,
     settings: Settings = (),
     keep_old: KeepOld = False,
     quiet: Quiet = False,

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 from typing import Annotated, Literal
 
-import tyro
+from tyro.conf import arg
 
 from ..arguments import (
     AsJson,
     ExperimentPath,
+    Flag,
     Frames,
     Out,
     Quiet,
@@ -30,20 +31,17 @@ def sensitivity(
     frames: Frames = None,
     settings: Settings = (),
     design: Annotated[
-        Literal["oat", "sobol"], tyro.conf.arg(help="one factor at a time, or all at once in a space-filling design")
+        Literal["oat", "sobol"], arg(help="one factor at a time, or all at once in a space-filling design")
     ] = "oat",
     factors: Annotated[
-        tuple[str, ...],
-        tyro.conf.arg(metavar="NAME[=LOW:HIGH]", help="factors to vary, with their ranges; default: all"),
+        tuple[str, ...], arg(metavar="NAME[=LOW:HIGH]", help="factors to vary, with their ranges; default: all")
     ] = (),
-    samples: Annotated[int | None, tyro.conf.arg(metavar="N", help="runs of --design sobol; default 64")] = None,
-    seed: Annotated[int, tyro.conf.arg(help="of the noise and of the design")] = 0,
+    samples: Annotated[int | None, arg(metavar="N", help="runs of --design sobol; default 64")] = None,
+    seed: Annotated[int, arg(help="of the noise and of the design")] = 0,
     workers: Workers = None,
     scheduler: Scheduler = None,
     budget: Annotated[
-        bool,
-        tyro.conf.FlagCreatePairsOff,
-        tyro.conf.arg(help="instead attribute each frame's error to its causes, and store that with the results"),
+        Flag, arg(help="instead attribute each frame's error to its causes, and store that with the results")
     ] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Annotated
 
-import tyro
+from tyro.conf import Positional, arg
 
 from ...process.errors import InputError
-from ..arguments import AsJson
+from ..arguments import AsJson, Flag
 from ..terminal import table_console
 
 if TYPE_CHECKING:
@@ -18,13 +18,9 @@ if TYPE_CHECKING:
 
 
 def settings(
-    which: Annotated[
-        str | None, tyro.conf.Positional, tyro.conf.arg(metavar="SECTION|KEY", help="default: every section")
-    ] = None,
+    which: Annotated[str | None, Positional, arg(metavar="SECTION|KEY", help="default: every section")] = None,
     /,
-    markdown: Annotated[
-        bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="print all as a page of documentation")
-    ] = False,
+    markdown: Annotated[Flag, arg(help="print all as a page of documentation")] = False,
     as_json: AsJson = False,
 ) -> int:
     """List the keys of experiment.toml and --set: default, unit, meaning.

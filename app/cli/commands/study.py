@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
+from tyro.conf import Positional, arg
 
 from ...synthetic.scenarios.preset_names import ScenarioName
 from ..arguments import AsJson, Quiet, Settings
@@ -34,8 +34,8 @@ STUDIES: Mapping[StudySubject, Callable[[StudyRequest], int]] = {
 def study(
     subject: Annotated[
         StudySubject,
-        tyro.conf.Positional,
-        tyro.conf.arg(
+        Positional,
+        arg(
             help="the paper's claims; r against noise; fit of trust and status; coverage of error bars; simulated "
             "scenarios of laboratory data; trust against r by kind of input, and its fit; fit of the weights of "
             "the two estimates; every statistic against the truth; coverage of the intervals of forces by "
@@ -47,64 +47,59 @@ def study(
     ],
     folder: Annotated[
         Path | None,
-        tyro.conf.Positional,
-        tyro.conf.arg(
+        Positional,
+        arg(
             metavar="PATH",
             help="real: a run, or files of PeGS, to be solved; perturbation, paper --program: an experiment with truth",
         ),
     ] = None,
     /,
-    seeds: Annotated[tuple[int, ...], tyro.conf.arg(help="of the simulated packings; default 0 1 2")] = (),
+    seeds: Annotated[tuple[int, ...], arg(help="of the simulated packings; default 0 1 2")] = (),
     grains: Annotated[
         int | None,
-        tyro.conf.arg(
+        arg(
             help="rods of a packing; default: paper, accuracy, status, uncertainty 1172, paper --program 300, "
             "fringes 200, others 450"
         ),
     ] = None,
     estimator: Annotated[
         Literal["ensemble", "nlgs"] | None,
-        tyro.conf.arg(
-            help="accuracy, uncertainty, worlds: mean of seven solutions (ensemble, the default), or one chain"
-        ),
+        arg(help="accuracy, uncertainty, worlds: mean of seven solutions (ensemble, the default), or one chain"),
     ] = None,
     ensemble: Annotated[
         int | None,
-        tyro.conf.arg(
+        arg(
             metavar="K",
             help="solutions with resampled input; uncertainty: default 8; intervals: adds their standard deviation",
         ),
     ] = None,
     scenarios: Annotated[
-        tuple[ScenarioName, ...],
-        tyro.conf.arg(name="worlds", help="of scenarios: only these; default: those of the study"),
+        tuple[ScenarioName, ...], arg(name="worlds", help="of scenarios: only these; default: those of the study")
     ] = (),
     varied: Annotated[
         tuple[int, ...],
-        tyro.conf.arg(metavar="SEED", help="of scenarios: seeds that draw step, stiffness, friction, noise … too"),
+        arg(metavar="SEED", help="of scenarios: seeds that draw step, stiffness, friction, noise … too"),
     ] = (),
-    jobs: Annotated[int | None, tyro.conf.arg(metavar="N", help="worlds, trust: processes; default 1")] = None,
+    jobs: Annotated[int | None, arg(metavar="N", help="worlds, trust: processes; default 1")] = None,
     fit: Annotated[
-        tuple[int, ...],
-        tyro.conf.arg(metavar="SEED", help="trust, intervals, numbers: also fit the constants on these seeds"),
+        tuple[int, ...], arg(metavar="SEED", help="trust, intervals, numbers: also fit the constants on these seeds")
     ] = (),
     settings: Settings = (),
     out: Annotated[
-        Path | None,
-        tyro.conf.arg(metavar="DIR", help="cache of simulated truths and scores; default runs/study"),
+        Path | None, arg(metavar="DIR", help="cache of simulated truths and scores; default runs/study")
     ] = None,
     as_json: AsJson = False,
     page: Annotated[
         Path | None,
-        tyro.conf.arg(
+        arg(
             metavar="OUT.html",
             help="real: pictures side by side, true, inferred and baseline; report: the page, default DIR/report.html",
         ),
     ] = None,
-    frame: Annotated[int | None, tyro.conf.arg(help="real: the frame of the pictures; default: the middle one")] = None,
+    frame: Annotated[int | None, arg(help="real: the frame of the pictures; default: the middle one")] = None,
     program: Annotated[
         Literal["authors"] | None,
-        tyro.conf.arg(
+        arg(
             help="paper: score the recipe of the authors' own program beside the paper's and this one, on PATH or on "
             "the apparatus of the preset 1g2e with radii 2 % too small"
         ),

@@ -7,13 +7,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
-import tyro
 from rich.console import Console
+from tyro.conf import Positional, arg
 
 from ...process.counts import state_count
 from ...process.errors import InputError, RunError
 from ...synthetic.scenarios.preset_names import FringedPreset, MeasuredPreset, PhotographedPreset, ScenarioName
-from ..arguments import Quiet
+from ..arguments import Flag, Quiet
 from ..terminal import progress_of
 
 if TYPE_CHECKING:
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
 
 def synth(
-    out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUT", help="folder to write")],
+    out: Annotated[Path, Positional, arg(metavar="OUT", help="folder to write")],
     /,
     preset: Annotated[
         PhotographedPreset | MeasuredPreset | FringedPreset | ScenarioName,
-        tyro.conf.arg(
+        arg(
             help="small, paper and 1g2e can be photographed; 1g2e: the apparatus of the method's authors, with corner "
             "discs, a measured load and .0267° of shear a photograph; photoelastic: discs and their forces as PeGS "
             "writes them, for rodsight import pegs; fringes: photographs of such discs with their fringes; "
@@ -33,26 +33,21 @@ def synth(
             "are scenarios of tracks: --no-photographs"
         ),
     ] = "small",
-    seed: Annotated[int, tyro.conf.arg(help="of the packing, its paint and its noise")] = 0,
-    photographs: Annotated[bool, tyro.conf.arg(help="render photographs; otherwise write tracks")] = True,
+    seed: Annotated[int, arg(help="of the packing, its paint and its noise")] = 0,
+    photographs: Annotated[bool, arg(help="render photographs; otherwise write tracks")] = True,
     noise: Annotated[
-        float | None,
-        tyro.conf.arg(help="of a tracked position [m], with --no-photographs; default: the preset's"),
+        float | None, arg(help="of a tracked position [m], with --no-photographs; default: the preset's")
     ] = None,
-    depth: Annotated[Literal[8, 16], tyro.conf.arg(help="bits of a photograph")] = 8,
-    jpeg_quality: Annotated[
-        int | None, tyro.conf.arg(help="of 8-bit photographs, 1 to 100; default: the preset's")
-    ] = None,
-    png: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="write PNG, not JPEG")] = False,
-    grains: Annotated[int | None, tyro.conf.arg(help="number of rods; default: the preset's")] = None,
-    frame_count: Annotated[
-        int | None, tyro.conf.arg(name="frames", help="number of photographs; default: the preset's")
-    ] = None,
-    step_degrees: Annotated[float | None, tyro.conf.arg(help="shear between photographs [°]")] = None,
-    pixel_size: Annotated[float | None, tyro.conf.arg(help="side of a pixel [m]")] = None,
-    reversal: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="reverse the shear half way")] = False,
+    depth: Annotated[Literal[8, 16], arg(help="bits of a photograph")] = 8,
+    jpeg_quality: Annotated[int | None, arg(help="of 8-bit photographs, 1 to 100; default: the preset's")] = None,
+    png: Annotated[Flag, arg(help="write PNG, not JPEG")] = False,
+    grains: Annotated[int | None, arg(help="number of rods; default: the preset's")] = None,
+    frame_count: Annotated[int | None, arg(name="frames", help="number of photographs; default: the preset's")] = None,
+    step_degrees: Annotated[float | None, arg(help="shear between photographs [°]")] = None,
+    pixel_size: Annotated[float | None, arg(help="side of a pixel [m]")] = None,
+    reversal: Annotated[Flag, arg(help="reverse the shear half way")] = False,
     radius_error: Annotated[
-        float, tyro.conf.arg(help="error that all stated radii share, as a fraction: -0.02 states them 2 % too small")
+        float, arg(help="error that all stated radii share, as a fraction: -0.02 states them 2 % too small")
     ] = 0.0,
     quiet: Quiet = False,
 ) -> int:

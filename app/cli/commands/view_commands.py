@@ -8,14 +8,14 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import tyro
 from rich.console import Console
 from rich.table import Table
+from tyro.conf import Positional, arg
 
 from ...process.counts import state_count
 from ...process.errors import InputError
 from ...process.machine.browser import open_page
-from ..arguments import AsJson, Browser, Port, ResultsPath, refuse_unused
+from ..arguments import AsJson, Browser, Flag, Port, ResultsPath, refuse_unused
 from ..stored_results import has_experiment, load_run, recording_file, results_file, warn_out_of_date
 from ..terminal import print_line, table_console
 
@@ -37,19 +37,11 @@ COLUMNS = (
 
 def view(
     recording: Annotated[
-        Path,
-        tyro.conf.Positional,
-        tyro.conf.arg(metavar="RECORDING_OR_DIR", help="a recording, a run's folder, or a folder of runs"),
+        Path, Positional, arg(metavar="RECORDING_OR_DIR", help="a recording, a run's folder, or a folder of runs")
     ],
     /,
-    web: Annotated[
-        bool,
-        tyro.conf.FlagCreatePairsOff,
-        tyro.conf.arg(help="in a browser: prints the address, and serves it until Ctrl+C"),
-    ] = False,
-    only_list: Annotated[
-        bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(name="list", help="of a folder: list its recordings only")
-    ] = False,
+    web: Annotated[Flag, arg(help="in a browser: prints the address, and serves it until Ctrl+C")] = False,
+    only_list: Annotated[Flag, arg(name="list", help="of a folder: list its recordings only")] = False,
 ) -> int:
     """Open a recording with its blueprint, or a folder of recordings as a catalogue.
 
@@ -72,24 +64,18 @@ def view(
 
 
 def review(
-    experiment: Annotated[
-        Path, tyro.conf.Positional, tyro.conf.arg(metavar="EXPERIMENT_OR_DIR", help="an experiment, or a run's folder")
-    ],
+    experiment: Annotated[Path, Positional, arg(metavar="EXPERIMENT_OR_DIR", help="an experiment, or a run's folder")],
     /,
     port: Port = 0,
     browser: Browser = True,
-    reviewer: Annotated[str | None, tyro.conf.arg(metavar="NAME", help="who judges; default: the user's name")] = None,
+    reviewer: Annotated[str | None, arg(metavar="NAME", help="who judges; default: the user's name")] = None,
     import_csv: Annotated[
-        Path | None, tyro.conf.arg(metavar="FILE", help="add the verdicts of a table frame,i,j[,verdict], and end")
+        Path | None, arg(metavar="FILE", help="add the verdicts of a table frame,i,j[,verdict], and end")
     ] = None,
     complete: Annotated[
-        bool,
-        tyro.conf.FlagCreatePairsOff,
-        tyro.conf.arg(help="the imported table lists every contact of its frames: all other candidates are none"),
+        Flag, arg(help="the imported table lists every contact of its frames: all other candidates are none")
     ] = False,
-    export_csv: Annotated[
-        Path | None, tyro.conf.arg(metavar="FILE", help="write the verdicts as a table, and end")
-    ] = None,
+    export_csv: Annotated[Path | None, arg(metavar="FILE", help="write the verdicts as a table, and end")] = None,
 ) -> int:
     """Judge contacts by eye on a local page; the solver uses the verdicts.
 
@@ -113,13 +99,9 @@ def review(
 def score(
     results: ResultsPath,
     /,
-    truth: Annotated[
-        Path | None, tyro.conf.arg(metavar="FILE", help="table frame,i,j,fn,ft; default: the experiment's")
-    ] = None,
+    truth: Annotated[Path | None, arg(metavar="FILE", help="table frame,i,j,fn,ft; default: the experiment's")] = None,
     as_json: AsJson = False,
-    fit_threshold: Annotated[
-        bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="refit gap threshold and radii from verdicts")
-    ] = False,
+    fit_threshold: Annotated[Flag, arg(help="refit gap threshold and radii from verdicts")] = False,
 ) -> int:
     """Compare inferred contacts and forces with true ones, and with the verdicts of people.
 
@@ -200,11 +182,11 @@ def _print_agreement(console: Console, solved: Results, known: TruthContacts) ->
 
 
 def compare(
-    first: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="A", help="folder of a run, or results.h5")],
-    second: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="B", help="the other run")] = None,
+    first: Annotated[Path, Positional, arg(metavar="A", help="folder of a run, or results.h5")],
+    second: Annotated[Path | None, Positional, arg(metavar="B", help="the other run")] = None,
     /,
-    truth: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="compare A with its truth")] = False,
-    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help="the recording; default compare-A-B.rrd")] = None,
+    truth: Annotated[Flag, arg(help="compare A with its truth")] = False,
+    out: Annotated[Path | None, arg(metavar="FILE", help="the recording; default compare-A-B.rrd")] = None,
 ) -> int:
     """Show two results side by side with their difference.
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
+from tyro.conf import Positional, UseAppendAction, arg
 
 from ...process.errors import InputError
 from ..arguments import Browser, Port, Quiet, parse_frames
@@ -14,9 +14,7 @@ from ..arguments import Browser, Port, Quiet, parse_frames
 
 def open_(
     folder: Annotated[
-        Path,
-        tyro.conf.Positional,
-        tyro.conf.arg(metavar="FOLDER", help="of photographs, of an experiment or of several"),
+        Path, Positional, arg(metavar="FOLDER", help="of photographs, of an experiment or of several")
     ] = Path(),
     /,
     port: Port = 0,
@@ -32,66 +30,52 @@ def open_(
 
 
 def init(
-    folder: Annotated[
-        Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER", help="of the experiment, with the photographs")
-    ],
+    folder: Annotated[Path, Positional, arg(metavar="FOLDER", help="of the experiment, with the photographs")],
     /,
-    photographs: Annotated[
-        str, tyro.conf.arg(metavar="PATTERN", help="of the photographs, or a video, relative to FOLDER")
-    ],
-    pixel_size: Annotated[float | None, tyro.conf.arg(metavar="METRES", help="side of a pixel [m]")] = None,
-    interval: Annotated[float | None, tyro.conf.arg(metavar="SECONDS", help="between photographs [s]")] = None,
-    radii: Annotated[str | None, tyro.conf.arg(metavar="R,R,…", help="known radius classes [m]")] = None,
+    photographs: Annotated[str, arg(metavar="PATTERN", help="of the photographs, or a video, relative to FOLDER")],
+    pixel_size: Annotated[float | None, arg(metavar="METRES", help="side of a pixel [m]")] = None,
+    interval: Annotated[float | None, arg(metavar="SECONDS", help="between photographs [s]")] = None,
+    radii: Annotated[str | None, arg(metavar="R,R,…", help="known radius classes [m]")] = None,
     walls: Annotated[
-        str, tyro.conf.arg(metavar="auto|none|FILE", help="found around the rods, none, or a table of their ends [m]")
+        str, arg(metavar="auto|none|FILE", help="found around the rods, none, or a table of their ends [m]")
     ] = "auto",
     pressure: Annotated[
-        tuple[str, ...],
-        tyro.conf.UseAppendAction,
-        tyro.conf.arg(metavar="WALL=PASCAL", help="pressure on a wall [Pa]; repeatable"),
+        tuple[str, ...], UseAppendAction, arg(metavar="WALL=PASCAL", help="pressure on a wall [Pa]; repeatable")
     ] = (),
-    density: Annotated[float | None, tyro.conf.arg(metavar="KG/M3", help="of the rods [kg/m³]")] = None,
-    length: Annotated[float | None, tyro.conf.arg(metavar="METRES", help="of the rods [m]")] = None,
+    density: Annotated[float | None, arg(metavar="KG/M3", help="of the rods [kg/m³]")] = None,
+    length: Annotated[float | None, arg(metavar="METRES", help="of the rods [m]")] = None,
     friction: Annotated[
         str | None,
-        tyro.conf.arg(
-            metavar="MU|measured", help="coefficient of friction between rods; measured: found from the motion"
-        ),
+        arg(metavar="MU|measured", help="coefficient of friction between rods; measured: found from the motion"),
     ] = None,
     channel: Annotated[
         Literal["grey", "red", "green", "blue"] | None,
-        tyro.conf.arg(help="of the photographs; default: the one in which the rods stand out best, by trial"),
+        arg(help="of the photographs; default: the one in which the rods stand out best, by trial"),
     ] = None,
     region: Annotated[
-        str | None, tyro.conf.arg(metavar="X0,Y0,X1,Y1", help="columns and rows [px] outside of which nothing is seen")
+        str | None, arg(metavar="X0,Y0,X1,Y1", help="columns and rows [px] outside of which nothing is seen")
     ] = None,
     follow: Annotated[
         Literal["texture", "outline"] | None,
-        tyro.conf.arg(
-            help="by the texture of the rods, or by their outline where they are plain; default: by trying both"
-        ),
+        arg(help="by the texture of the rods, or by their outline where they are plain; default: by trying both"),
     ] = None,
     radius_range: Annotated[
-        str | None, tyro.conf.arg(metavar="A:B", help="of the radii to look for [px], where --radii are unknown")
+        str | None, arg(metavar="A:B", help="of the radii to look for [px], where --radii are unknown")
     ] = None,
     frames: Annotated[
         str | None,
-        tyro.conf.arg(
-            metavar="A:B[:STEP]", help="of a video, by their numbers from 0; --interval chooses them by time as well"
-        ),
+        arg(metavar="A:B[:STEP]", help="of a video, by their numbers from 0; --interval chooses them by time as well"),
     ] = None,
-    lens: Annotated[
-        Path | None, tyro.conf.arg(metavar="FILE", help="calibration of OpenCV: .yml, .xml, .json or .npz")
-    ] = None,
+    lens: Annotated[Path | None, arg(metavar="FILE", help="calibration of OpenCV: .yml, .xml, .json or .npz")] = None,
     grains: Annotated[
         Path | None,
-        tyro.conf.arg(
+        arg(
             metavar="FILE",
             help="the rods of the first photograph as another program has found them: a label image (StarDist, "
             "Cellpose, napari), a table of ImageJ, or a table id,x,y,radius [px]",
         ),
     ] = None,
-    name: Annotated[str | None, tyro.conf.arg(help="of the experiment; default: of the folder")] = None,
+    name: Annotated[str | None, arg(help="of the experiment; default: of the folder")] = None,
     quiet: Quiet = False,
 ) -> int:
     """Set up an experiment from flags: experiment.toml, walls, rods, and understood.png, a picture of them.
