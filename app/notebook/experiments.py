@@ -12,17 +12,13 @@ import numpy as np
 import pandas as pd
 
 from .. import pipeline
-from ..experiment.config.unused_keys import refuse_unused_keys
-from ..experiment.experiment import load_experiment
 from ..process.errors import InputError
 from ..process.progress import Progress
-from ..run_folder import Run as RunFolder
 from ..run_folder import hold_run
 from ..tracks import Tracks, TrackStatus
 from .arguments import arguments_named, as_frames, as_strings, is_number
-from .made_runs import run
+from .made_runs import folder_of, run
 from .run import Run
-from .shown_progress import shown_progress
 
 Settings = Mapping[str, object]
 TRACK_UNITS = {"time": "s", "x": "m", "y": "m", "theta": "rad", "radius": "m", "sigma": "m"}
@@ -152,9 +148,7 @@ def check(
     """
     from ..input_check import check_input
 
-    loaded = load_experiment(Path(experiment), as_strings(settings or {}))
-    refuse_unused_keys(loaded.config, loaded.file)
-    report = check_input(RunFolder(loaded, Path("runs"), progress=progress or shown_progress()), predict=predict)
+    report = check_input(folder_of(experiment, "runs", settings, progress=progress), predict=predict)
     return pd.Series({name: getattr(report, name) for name in report.__dataclass_fields__}, dtype=object)
 
 
@@ -201,10 +195,9 @@ def track(
     >>> len(tracks), tracks.attrs["units"]["theta"]
     (200, 'rad')
     """
-    loaded = load_experiment(Path(experiment), as_strings(settings or {}))
-    if report and loaded.config.photographs is None:
-        raise InputError(loaded.file, "report", "needs photographs, but these tracks come from a table")
-    folder = RunFolder(loaded, _folder(out, loaded.name), as_frames(frames), progress or shown_progress())
+    folder = folder_of(experiment, out, settings, frames, progress)
+    if report and folder.experiment.config.photographs is None:
+        raise InputError(folder.experiment.file, "report", "needs photographs, but these tracks come from a table")
     with hold_run(folder):
         tracks, walls = pipeline.track(folder)
         if report:
@@ -259,20 +252,14 @@ def follow(
 
     if idle is not None and not (is_number(idle) and idle > 0.0):
         raise InputError("idle", str(idle), "is not a positive number of seconds")
-    texts, watched = as_strings(settings or {}), progress or shown_progress()
-    loaded = load_experiment(Path(experiment), texts)
-    folder = RunFolder(loaded, _folder(out, loaded.name), progress=watched)
+    folder, texts = folder_of(experiment, out, settings, progress=progress), as_strings(settings or {})
     with hold_run(folder):
         for results in follow_photographs(
             folder, tuple(texts), idle=idle, alarm=lambda frame, text: None, report=lambda text: None
         ):
             frames, statistics = list(results.frames), list(results.statistics)
             yield Run(replace(results, frames=frames, statistics=statistics))
-    yield run(experiment, out=folder.folder, settings=settings, progress=watched)
-
-
-def _folder(out: str | PathLike[str] | None, name: str) -> Path:
-    return Path(out) if out is not None else Path("runs") / name
+    yield run(experiment, out=folder.folder, settings=settings, progress=folder.progress)
 
 
 def _table(tracks: Tracks) -> pd.DataFrame:

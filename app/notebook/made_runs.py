@@ -61,16 +61,27 @@ def run(
     'my_test'
     """
     began = time.perf_counter()
-    loaded = load_experiment(Path(experiment), as_strings(settings or {}))
-    refuse_unused_keys(loaded.config, loaded.file)
-    folder = Path(out) if out is not None else Path("runs") / loaded.name
-    folder_of_run = RunFolder(loaded, folder, as_frames(frames), progress or shown_progress())
+    folder_of_run = folder_of(experiment, out, settings, frames, progress)
     with hold_run(folder_of_run):
         results = pipeline.solve(folder_of_run)
         truth = load_truth(folder_of_run, results)
         pipeline.record(folder_of_run, results, truth)
         pipeline.conclude(folder_of_run, results, truth, began)
     return Run(folder_of_run.file(RESULTS))
+
+
+def folder_of(
+    experiment: str | PathLike[str],
+    out: str | PathLike[str] | None,
+    settings: Mapping[str, object] | None,
+    frames: tuple[int, int | None] | tuple[int, int | None, int] = ALL_FRAMES,
+    progress: Progress | None = None,
+) -> RunFolder:
+    """Return the folder of a run of an experiment, by default runs/NAME. Raises InputError."""
+    loaded = load_experiment(Path(experiment), as_strings(settings or {}))
+    refuse_unused_keys(loaded.config, loaded.file)
+    folder = Path(out) if out is not None else Path("runs") / loaded.name
+    return RunFolder(loaded, folder, as_frames(frames), progress or shown_progress())
 
 
 def open_run(path: str | PathLike[str]) -> Run:

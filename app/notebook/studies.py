@@ -16,16 +16,14 @@ import pandas as pd
 from .. import pipeline
 from ..campaigns.campaign import run_campaign
 from ..campaigns.plan import EXPERIMENT, read_plan
-from ..experiment.config.unused_keys import refuse_unused_keys
-from ..experiment.experiment import load_experiment
 from ..process.atomic import write_atomically
 from ..process.errors import InputError, RunError
 from ..process.progress import Progress
 from ..robustness.execution import reach_scheduler
-from ..run_folder import Run as RunFolder
 from ..run_folder import hold_run
 from ..solver.parallel import available_cores
-from .arguments import arguments_named, as_strings
+from .arguments import arguments_named
+from .made_runs import folder_of
 from .shown_progress import shown_progress
 
 TABLE = "campaign.csv"  # of a campaign given as a data frame, in its folder
@@ -84,8 +82,7 @@ def sensitivity(
     """
     from ..robustness import design, report, study
 
-    loaded = load_experiment(Path(experiment), as_strings(settings or {}))
-    refuse_unused_keys(loaded.config, loaded.file)
+    run = folder_of(experiment, out, settings, progress=progress)
     wanted = (
         [f"{name}={ends[0]!r}:{ends[1]!r}" for name, ends in factors.items()]
         if isinstance(factors, Mapping)
@@ -95,17 +92,15 @@ def sensitivity(
     if scheduler is not None:
         reach_scheduler(scheduler)
     kind: design.Design = "oat" if samples is None else "sobol"
-    folder = Path(out) if out is not None else Path("runs") / loaded.name
-    run = RunFolder(loaded, folder, progress=progress or shown_progress())
     with hold_run(run):
-        varied, cases = design.plan(loaded, kind, wanted, samples, 0)
+        varied, cases = design.plan(run.experiment, kind, wanted, samples, 0)
         nominal, fingerprint = pipeline.nominal_run(run)
         effects = study.run_study(
             nominal, cases, study.EffectLog(run.file(study.EFFECT_LOG), fingerprint),
             workers=_processes(workers), scheduler=scheduler, progress=run.progress,
         )  # fmt: skip
         own = study.compare(nominal.networks, nominal)
-        results = report.SensitivityResults(loaded.name, kind, varied, cases, effects, own)
+        results = report.SensitivityResults(run.experiment.name, kind, varied, cases, effects, own)
         report.save_sensitivity(results, run.folder)
     rows = [
         {each.name: dict(case.values).get(each.name, each.nominal) for each in varied} | asdict(effect)
