@@ -41,7 +41,6 @@ APPLICATION_ID = "rodsight-compare"  # a separate one, so that the viewer does n
 FIRST, SECOND = "/compare/first", "/compare/second"
 DIFFERENCE = "/compare/difference"
 SCATTER, SCATTER_AXES = "/compare/scatter/contacts", "/compare/scatter/axes"
-SCATTER_TICKS = "/compare/scatter/axes/ticks"
 R_FN, R_FT, ERROR, SUM_RATIO = (f"/compare/{name}" for name in ("r_fn", "r_ft", "relative_l2", "sum_ratio"))
 ANGLES = tuple(f"/compare/{which}/{name}" for which in ("first", "second") for name in ("friction_angle", "wall_ratio"))
 SUMMARY = "/compare/summary"
@@ -147,7 +146,7 @@ def _log_styles(stream: rr.RecordingStream, scene: Scene, comparison: Comparison
         log_curve_style(stream, path, name, colour, width)
     reach = 1.15 * scene.style.range.top
     axes = Axes((0.0, reach), (0.0, reach), width=400.0, height=400.0)
-    log_scatter_axes(stream, axes, SCATTER_AXES, SCATTER_TICKS, f"{second} [N]", f"{first} [N]")
+    log_scatter_axes(stream, axes, SCATTER_AXES, f"{second} [N]", f"{first} [N]")
     return axes
 
 

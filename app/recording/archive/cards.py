@@ -83,7 +83,7 @@ def _network(recording: Path, canvas: Canvas) -> str:
     texts = [
         *_texts(_last(recording, entities.CAPTION), canvas),
         *_texts(_static(recording, entities.SCALE_BAR_LENGTH), canvas),
-        *_texts(_static(recording, entities.FORCE_LEGEND_TICKS), canvas),
+        *_texts(_static(recording, entities.FORCE_LEGEND + entities.TICKS), canvas),
     ]
     circles = list(zip(grains.get("Ellipses2D:centers", []), grains.get("Ellipses2D:half_sizes", []), strict=True))
     top, height = canvas.top - canvas.header_height, canvas.height + canvas.header_height + KEY * canvas.legend_height

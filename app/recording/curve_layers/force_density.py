@@ -35,7 +35,6 @@ class ForceDensity:
         AXES.log(
             stream,
             entities.FORCE_DENSITY_AXES,
-            entities.FORCE_DENSITY_TICKS,
             x_ticks=[(float(v), f"{v}") for v in range(0, 9, 2)],
             y_ticks=[(-4.0, "10⁻⁴"), (-3.0, "10⁻³"), (-2.0, "10⁻²"), (-1.0, "10⁻¹"), (0.0, "1")],
             notes=[

@@ -31,7 +31,7 @@ def log_radius_curve(stream: rr.RecordingStream, tuning: RadiusTuning) -> None:
         label = f"z = {tuning.reached:.2f} at {1e6 * tuning.found:+.1f} µm"
         notes += [(axes.x_range[0] + 0.25 * span, high + 1.9 * margin, label, SERIES[2])]
     axes.log(
-        stream, entities.RADIUS_AXES, entities.RADIUS_TICKS, x_ticks=round_ticks(*axes.x_range, 4.0),
+        stream, entities.RADIUS_AXES, x_ticks=round_ticks(*axes.x_range, 4.0),
         y_ticks=round_ticks(*axes.y_range, 4.0), notes=notes, guides=[wanted],
     )  # fmt: skip
     stream.log(entities.RADIUS_CURVE, strips([axes.points(change, number)], 1.6, SERIES[0], 10.0), static=True)

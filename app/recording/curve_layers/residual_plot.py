@@ -122,7 +122,6 @@ class ResidualPlot:
         axes.log(
             stream,
             entities.RESIDUAL_AXES,
-            entities.RESIDUAL_TICKS,
             x_ticks=[(float(k), _power(k)) for k in range(int(decades) + 1)],
             y_ticks=[(float(k), _power(k)) for k in range(int(DECADES[0]), int(DECADES[1]) + 1, 2)],
             notes=[(x * decades, DECADES[0] + y * (DECADES[1] - DECADES[0]), text, of) for x, y, text, of in notes],

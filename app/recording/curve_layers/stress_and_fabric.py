@@ -25,7 +25,7 @@ def log_polar_axes(stream: rr.RecordingStream) -> None:
     log_cross_hairs(stream, entities.ROSE_AXES, ROSE_REACH)
     log_texts(
         stream,
-        entities.ROSE_TICKS,
+        entities.ROSE_AXES + entities.TICKS,
         [
             (_corner(ROSE_REACH, 0), "contacts between grains", SERIES[1]),
             (_corner(ROSE_REACH, 1), "their forces", SERIES[0]),

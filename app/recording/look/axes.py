@@ -10,6 +10,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from ...solver.bodies.grains import Array
+from . import entities
 from .clock import Clock
 from .colours import FAINT, INK, SERIES, Rgba, packed
 from .values import dots, strips
@@ -38,8 +39,7 @@ class Axes:
     def log(
         self,
         stream: rr.RecordingStream,
-        lines: str,
-        ticks: str,
+        path: str,
         *,
         x_ticks: Sequence[tuple[float, str]],
         y_ticks: Sequence[tuple[float, str]],
@@ -52,8 +52,8 @@ class Axes:
         ----------
         stream : RecordingStream
             The stream.
-        lines, ticks : str
-            Entities of the lines and of the texts.
+        path : str
+            Entity of the lines; that of the texts is below it.
         x_ticks, y_ticks : sequence of (float, str)
             Value and label of every grid line.
         notes : sequence of (float, float, str, Rgba)
@@ -66,13 +66,13 @@ class Axes:
         grid += [self.points(np.array([x0, x1]), np.array([y, y])) for y, _ in y_ticks]
         shades = np.array([FAINT] * len(grid) + [INK] * len(guides), np.uint8)
         shades[: len(grid), 3] = 90
-        stream.log(lines, strips([*grid, *guides], 0.6, packed(shades), 0.0), static=True)
+        stream.log(path, strips([*grid, *guides], 0.6, packed(shades), 0.0), static=True)
         # The viewer places a text below its point.
         raised, left = 16.0 * (y1 - y0) / self.height, 22.0 * (x1 - x0) / self.width
         texts = [(x, y0, text, INK) for x, text in x_ticks]
         texts += [(x0 - left, y + raised, text, INK) for y, text in y_ticks]
         placed = [(self.points(np.array(x), np.array(y)), text, colour) for x, y, text, colour in [*texts, *notes]]
-        log_texts(stream, ticks, placed)
+        log_texts(stream, path + entities.TICKS, placed)
 
 
 def log_texts(
@@ -110,12 +110,12 @@ def log_cross_hairs(stream: rr.RecordingStream, path: str, reach: float) -> None
     stream.log(path, strips(lines, 0.5, FAINT, 0.0), static=True)
 
 
-def log_scatter_axes(stream: rr.RecordingStream, axes: Axes, lines: str, ticks: str, across: str, up: str) -> None:
+def log_scatter_axes(stream: rr.RecordingStream, axes: Axes, path: str, across: str, up: str) -> None:
     """Log axes of equal ranges from zero with the line of equality and their names, static."""
     reach = axes.x_range[1]
     values = round_ticks(0.0, reach, 2.5)
     axes.log(
-        stream, lines, ticks, x_ticks=values, y_ticks=values,
+        stream, path, x_ticks=values, y_ticks=values,
         notes=[(0.8 * reach, 0.1 * reach, f"across: {across}", INK), (0.24 * reach, 0.97 * reach, f"up: {up}", INK)],
         guides=[axes.points(np.array([0.0, reach]), np.array([0.0, reach]))],
     )  # fmt: skip

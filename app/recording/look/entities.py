@@ -29,15 +29,11 @@ FRAME_CARD = "/card"
 FORCE_LEGEND = "/legend/force"
 SCALE_BAR = "/legend/scale"
 SCALE_BAR_LENGTH = "/legend/scale/length"
-FORCE_LEGEND_TICKS = "/legend/force/ticks"
 FORCE_LEGEND_NOTES = "/legend/force/notes"
 UNCERTAINTY_LEGEND = "/legend/force/gaps"
-UNCERTAINTY_LEGEND_TICKS = "/legend/force/gaps/ticks"
 GAP_LEGEND = "/legend/gap"
-GAP_LEGEND_TICKS = "/legend/gap/ticks"
 COLOUR_LEGENDS = "/legend/by"  # followed by the quantity
 MAP_LEGEND = "/legend/unconverged"
-MAP_LEGEND_TICKS = "/legend/unconverged/ticks"
 
 SWEEP_FORCE_CHANGE = "/solve/force_change"
 SWEEP_NATURAL_MAP = "/solve/natural_map"
@@ -47,7 +43,6 @@ RESIDUAL_CURVES = "/solve/plot/curves"
 RESIDUAL_MARKS = "/solve/plot/marks"
 RESIDUAL_REPORTED = "/solve/plot/reported"
 RESIDUAL_AXES = "/solve/plot/axes"
-RESIDUAL_TICKS = "/solve/plot/axes/ticks"
 UNBALANCE_MAP = "/solve/map/unbalance"
 CHANGE_MAP = "/solve/map/change"
 
@@ -104,13 +99,13 @@ WALL_NORMAL_FORCE = "/statistics/wall_normal_force"
 WALL_TANGENTIAL_FORCE = "/statistics/wall_tangential_force"
 WALL_NORMAL_RECORDED = "/statistics/wall_normal_force/recorded"
 WALL_TANGENTIAL_RECORDED = "/statistics/wall_tangential_force/recorded"
+TICKS = "/ticks"  # child of a legend or of axes: the texts beside it
 BAND = "/band"  # child of a curve: two standard deviations to either side
 FORCE_DENSITY = "/statistics/force_density/frame"
 FORCE_DENSITY_TAIL = "/statistics/force_density/tail"
 FORCE_DENSITY_TAIL_VALUE = "/statistics/force_density/tail/value"
 FORCE_DENSITY_POOLED = "/statistics/force_density/pooled"
 FORCE_DENSITY_AXES = "/statistics/force_density/axes"
-FORCE_DENSITY_TICKS = "/statistics/force_density/axes/ticks"
 STRESS_CROSS = "/statistics/stress/cross"
 STRESS_VALUES = "/statistics/stress/values"
 STRESS_CURVE = "/statistics/stress/curve"
@@ -118,11 +113,9 @@ STRESS_AXES = "/statistics/stress/axes"
 ROSE = "/statistics/rose/contacts"
 ROSE_OF_FORCES = "/statistics/rose/forces"
 ROSE_AXES = "/statistics/rose/axes"
-ROSE_TICKS = "/statistics/rose/axes/ticks"
 RADIUS_CURVE = "/statistics/radius_curve/curve"
 RADIUS_FOUND = "/statistics/radius_curve/found"
 RADIUS_AXES = "/statistics/radius_curve/axes"
-RADIUS_TICKS = "/statistics/radius_curve/axes/ticks"
 
 LOCAL_SHEAR, D2MIN, LOCAL_ROTATION = "shear_strain", "d2min", "rotation"  # maps of the kinematics
 KINEMATIC_MAPS = "/kinematics/map"
@@ -139,7 +132,6 @@ FRINGES_OF_FRAME = "/fringes/plot/frame"
 FRINGES_OF_ALL = "/fringes/plot/all"
 FRINGE_CURVE = "/fringes/plot/curve"
 FRINGE_AXES = "/fringes/plot/axes"
-FRINGE_TICKS = "/fringes/plot/axes/ticks"
 
 RODS = "/rods/bodies"
 ROD_CHAINS = "/rods/chains"
@@ -153,10 +145,8 @@ FILM_SWEEPS = "/film/sweeps/pictures"
 TRUTH_FORCES = "/truth/force"
 TRUTH_DIFFERENCE = "/truth/difference"
 DIFFERENCE_LEGEND = "/legend/difference"
-DIFFERENCE_TICKS = "/legend/difference/ticks"
 TRUTH_SCATTER = "/truth/scatter/contacts"
 TRUTH_AXES = "/truth/scatter/axes"
-TRUTH_TICKS = "/truth/scatter/axes/ticks"
 TRUTH_R_FN = "/truth/r_fn"
 TRUTH_R_FT = "/truth/r_ft"
 TRUTH_ERROR = "/truth/relative_l2"
@@ -172,13 +162,3 @@ COLOURED_BY = TANGENTIAL, SLIDING_PROBABILITY, BEARING_PROBABILITY, TOUCHING_PRO
 def coloured_by(name: str) -> str:
     """Return the archetype of the colours by a quantity of COLOURED_BY; its component is `colors`."""
     return f"by_{name}"
-
-
-# Curves of statistics, each with a band.
-BANDED = (
-    FRICTION_ANGLE, WALL_RATIO_ANGLE, PRINCIPAL_DIRECTION, PRESSURE, COORDINATION_NUMBER,
-    COORDINATION_NUMBER_WITHOUT_RATTLERS, RATTLER_COUNT, CONTACT_COUNT, SLIDING_FRACTION, MEAN_FN, MAX_FN,
-    FABRIC_ANISOTROPY, SIGMA_1, SIGMA_2, ANISOTROPY_ANGLE, CONTACT_ANISOTROPY, BRANCH_ANISOTROPY,
-    NORMAL_FORCE_ANISOTROPY, TANGENTIAL_FORCE_ANISOTROPY, MOBILISATION, TAIL_EXPONENT, PLATEAU_RATIO, STRONG_FRACTION,
-    STRONG_PRESSURE_FRACTION, STRONG_DEVIATOR_FRACTION, CHAIN_COUNT, CHAIN_GRAIN_FRACTION,
-)  # fmt: skip

@@ -9,6 +9,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from ...solver.bodies.grains import Array
+from . import entities
 from .axes import log_texts
 from .canvas import Canvas
 from .colours import INK, Rgba
@@ -22,7 +23,6 @@ def log_ramp_legend(
     stream: rr.RecordingStream,
     canvas: Canvas,
     path: str,
-    ticks: str,
     colours: NDArray[np.uint32],
     texts: list[tuple[float, str]],
     notes: Sequence[tuple[float, str, Rgba]] = (),
@@ -35,8 +35,8 @@ def log_ramp_legend(
         The stream.
     canvas : Canvas
         Bounds of the packing view.
-    path, ticks : str
-        Entities of the line and of the texts.
+    path : str
+        Entity of the line; that of the texts is below it.
     colours : array (PIECES,)
         Colours along the line.
     texts : list of (float, str)
@@ -45,7 +45,7 @@ def log_ramp_legend(
         Fraction of the length, text and colour, below the texts.
     """
     stream.log(path, strips(legend_pieces(canvas), 0.22 * canvas.grain_radius, colours, 50.0), static=True)
-    log_legend_texts(stream, canvas, ticks, texts, notes)
+    log_legend_texts(stream, canvas, path + entities.TICKS, texts, notes)
 
 
 def legend_span(canvas: Canvas) -> tuple[float, float, float]:

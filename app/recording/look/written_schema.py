@@ -121,12 +121,23 @@ def _marked(path: str, meaning: str) -> Entity:
     return Entity(path, meaning, _SCALAR | _MARKED, When.END)
 
 
+def _with_band(path: str, meaning: str) -> tuple[Entity, Entity]:
+    """A curve of a statistic and its band."""
+    band = "two standard deviations below and above the curve"
+    return _scalar(path, meaning), _scalar(path + entities.BAND, band)
+
+
+def _with_ticks(path: str, meaning: str, values: str, condition: Condition = Condition.ALWAYS) -> tuple[Entity, Entity]:
+    """A legend or axes, and the texts beside it."""
+    texts = Entity(path + entities.TICKS, values, _TICKS, When.STATIC, condition)
+    return Entity(path, meaning, _STRIPS, When.STATIC, condition), texts
+
+
 def _maps(paths: str, legends: str, maps: tuple[tuple[str, str], ...], condition: Condition) -> Iterator[Entity]:
     """Yield maps of the grains with their legends."""
     for name, meaning in maps:
         yield Entity(f"{paths}/{name}", meaning, _POINTS, When.START, condition)
-        yield Entity(f"{legends}/{name}", "its colours", _STRIPS, When.STATIC, condition)
-        yield Entity(f"{legends}/{name}/ticks", "their values", _TICKS, When.STATIC, condition)
+        yield from _with_ticks(f"{legends}/{name}", "its colours", "their values", condition)
 
 
 SCHEMA: tuple[Entity, ...] = (
@@ -170,24 +181,17 @@ SCHEMA: tuple[Entity, ...] = (
     ),
     Entity(entities.SCALE_BAR, "a bar of a round length", _STRIPS, When.STATIC),
     Entity(entities.SCALE_BAR_LENGTH, "its length", _TICKS, When.STATIC),
-    Entity(entities.FORCE_LEGEND, "width and colour of f_n", _STRIPS, When.STATIC),
-    Entity(entities.FORCE_LEGEND_TICKS, "its values [N]", _TICKS, When.STATIC),
+    *_with_ticks(entities.FORCE_LEGEND, "width and colour of f_n", "its values [N]"),
     Entity(entities.FORCE_LEGEND_NOTES, "legend of points and rims", _TICKS, When.STATIC),
-    Entity(entities.UNCERTAINTY_LEGEND, "legend of gaps", _STRIPS, When.STATIC),
-    Entity(entities.UNCERTAINTY_LEGEND_TICKS, "its values", _TICKS, When.STATIC),
+    *_with_ticks(entities.UNCERTAINTY_LEGEND, "legend of gaps", "its values"),
     Entity(entities.WALL_KEY, "names of the walls in the colours of their curves", _TICKS, When.STATIC),
-    Entity(entities.GAP_LEGEND, "colour of the gap", _STRIPS, When.STATIC),
-    Entity(entities.GAP_LEGEND_TICKS, "its values [µm]", _TICKS, When.STATIC),
+    *_with_ticks(entities.GAP_LEGEND, "colour of the gap", "its values [µm]"),
     *(
-        Entity(f"{entities.COLOUR_LEGENDS}/{name}", f"colour by {name}", _STRIPS, When.STATIC)
+        entity
         for name in entities.COLOURED_BY
+        for entity in _with_ticks(f"{entities.COLOUR_LEGENDS}/{name}", f"colour by {name}", "its values")
     ),
-    *(
-        Entity(f"{entities.COLOUR_LEGENDS}/{name}/ticks", "its values", _TICKS, When.STATIC)
-        for name in entities.COLOURED_BY
-    ),
-    Entity(entities.MAP_LEGEND, "colour of unbalance and change", _STRIPS, When.STATIC),
-    Entity(entities.MAP_LEGEND_TICKS, "its values, over the mean f_n", _TICKS, When.STATIC),
+    *_with_ticks(entities.MAP_LEGEND, "colour of unbalance and change", "its values, over the mean f_n"),
     _scalar(entities.SWEEP_FORCE_CHANGE, "log10 of the greatest |Δf|/|f|", When.SWEEPS, Condition.SWEPT),
     _scalar(entities.SWEEP_NATURAL_MAP, "log10 of the natural-map residual", When.SWEEPS, Condition.SWEPT),
     _scalar(
@@ -205,8 +209,7 @@ SCHEMA: tuple[Entity, ...] = (
         entities.RESIDUAL_REPORTED, "unbalance of the reported field, beyond the last sweep",
         _POINTS | {"Points2D:labels", "Points2D:show_labels"}, When.END, Condition.SWEPT,
     ),
-    Entity(entities.RESIDUAL_AXES, "axes and the stopping level", _STRIPS, When.STATIC, Condition.SWEPT),
-    Entity(entities.RESIDUAL_TICKS, "their values", _TICKS, When.STATIC, Condition.SWEPT),
+    *_with_ticks(entities.RESIDUAL_AXES, "axes and the stopping level", "their values", Condition.SWEPT),
     Entity(
         entities.UNBALANCE_MAP, "grains, colour by |ΣF| of the recorded forces over the mean f_n", _POINTS,
         When.START_AND_SWEEPS,
@@ -241,57 +244,53 @@ SCHEMA: tuple[Entity, ...] = (
         entities.FLAGS, "warnings about a frame", _of("TextLog", "text", "level"), When.FOUND,
         Condition.FLAGS,
     ),
-    _scalar(entities.FRICTION_ANGLE, "asin((σ₁−σ₂)/(σ₁+σ₂)) [°]"),
-    _scalar(entities.WALL_RATIO_ANGLE, "atan(T/N) on the loaded plate [°]"),
-    _scalar(entities.PRINCIPAL_DIRECTION, "direction of σ₁ [°], counter-clockwise from x"),
-    _scalar(entities.PRESSURE, "half the trace of the stress [kPa]"),
-    _scalar(entities.COORDINATION_NUMBER, "contacts with force per grain"),
-    _scalar(entities.COORDINATION_NUMBER_WITHOUT_RATTLERS, "contacts with force per grain, without rattlers"),
-    _scalar(entities.RATTLER_COUNT, "grains without load"),
-    _scalar(entities.CONTACT_COUNT, "contacts with force"),
-    _scalar(entities.SLIDING_FRACTION, "fraction of contacts with force at the Coulomb limit"),
-    _scalar(entities.MEAN_FN, "mean f_n [N]"),
-    _scalar(entities.MAX_FN, "greatest f_n [N]"),
-    _scalar(entities.FABRIC_ANISOTROPY, "2 (F₁ − F₂) of the fabric tensor"),
-    _scalar(entities.SIGMA_1, "greatest principal stress [kPa]"),
-    _scalar(entities.SIGMA_2, "smallest principal stress [kPa]"),
-    _scalar(entities.ANISOTROPY_ANGLE, "friction angle from the anisotropies [°]"),
-    _scalar(entities.CONTACT_ANISOTROPY, "a_c, of contact directions"),
-    _scalar(entities.BRANCH_ANISOTROPY, "a_l, of branch lengths"),
-    _scalar(entities.NORMAL_FORCE_ANISOTROPY, "a_n, of normal forces"),
-    _scalar(entities.TANGENTIAL_FORCE_ANISOTROPY, "a_t, of tangential forces"),
-    _scalar(entities.MOBILISATION, "mean |f_t| / (μ f_n)"),
-    _scalar(entities.TAIL_EXPONENT, "β of the exponential tail of P(f_n) above the mean"),
-    _scalar(entities.PLATEAU_RATIO, "P(f_n) of the weakest forces over its plateau below the mean; 1: flat"),
-    _scalar(entities.STRONG_FRACTION, "fraction of the contacts with more than the mean f_n"),
-    _scalar(entities.STRONG_PRESSURE_FRACTION, "fraction of the pressure carried by strong contacts"),
-    _scalar(entities.STRONG_DEVIATOR_FRACTION, "fraction of the stress deviator carried by strong contacts"),
-    _scalar(entities.CHAIN_COUNT, "force chains"),
-    _scalar(entities.CHAIN_GRAIN_FRACTION, "fraction of the grains that belong to a force chain"),
+    *_with_band(entities.FRICTION_ANGLE, "asin((σ₁−σ₂)/(σ₁+σ₂)) [°]"),
+    *_with_band(entities.WALL_RATIO_ANGLE, "atan(T/N) on the loaded plate [°]"),
+    *_with_band(entities.PRINCIPAL_DIRECTION, "direction of σ₁ [°], counter-clockwise from x"),
+    *_with_band(entities.PRESSURE, "half the trace of the stress [kPa]"),
+    *_with_band(entities.COORDINATION_NUMBER, "contacts with force per grain"),
+    *_with_band(entities.COORDINATION_NUMBER_WITHOUT_RATTLERS, "contacts with force per grain, without rattlers"),
+    *_with_band(entities.RATTLER_COUNT, "grains without load"),
+    *_with_band(entities.CONTACT_COUNT, "contacts with force"),
+    *_with_band(entities.SLIDING_FRACTION, "fraction of contacts with force at the Coulomb limit"),
+    *_with_band(entities.MEAN_FN, "mean f_n [N]"),
+    *_with_band(entities.MAX_FN, "greatest f_n [N]"),
+    *_with_band(entities.FABRIC_ANISOTROPY, "2 (F₁ − F₂) of the fabric tensor"),
+    *_with_band(entities.SIGMA_1, "greatest principal stress [kPa]"),
+    *_with_band(entities.SIGMA_2, "smallest principal stress [kPa]"),
+    *_with_band(entities.ANISOTROPY_ANGLE, "friction angle from the anisotropies [°]"),
+    *_with_band(entities.CONTACT_ANISOTROPY, "a_c, of contact directions"),
+    *_with_band(entities.BRANCH_ANISOTROPY, "a_l, of branch lengths"),
+    *_with_band(entities.NORMAL_FORCE_ANISOTROPY, "a_n, of normal forces"),
+    *_with_band(entities.TANGENTIAL_FORCE_ANISOTROPY, "a_t, of tangential forces"),
+    *_with_band(entities.MOBILISATION, "mean |f_t| / (μ f_n)"),
+    *_with_band(entities.TAIL_EXPONENT, "β of the exponential tail of P(f_n) above the mean"),
+    *_with_band(entities.PLATEAU_RATIO, "P(f_n) of the weakest forces over its plateau below the mean; 1: flat"),
+    *_with_band(entities.STRONG_FRACTION, "fraction of the contacts with more than the mean f_n"),
+    *_with_band(entities.STRONG_PRESSURE_FRACTION, "fraction of the pressure carried by strong contacts"),
+    *_with_band(entities.STRONG_DEVIATOR_FRACTION, "fraction of the stress deviator carried by strong contacts"),
+    *_with_band(entities.CHAIN_COUNT, "force chains"),
+    *_with_band(entities.CHAIN_GRAIN_FRACTION, "fraction of the grains that belong to a force chain"),
     _marked(entities.WALL_NORMAL_FORCE, "force of the packing on every wall along its outward normal [N]"),
     _marked(entities.WALL_TANGENTIAL_FORCE, "force of the packing on every wall along it [N]"),
     _scalar(entities.WALL_NORMAL_RECORDED, "recorded normal force on every wall [N]", When.END, Condition.WALL_FORCES),
     _scalar(entities.WALL_TANGENTIAL_RECORDED, "recorded force along every wall [N]", When.END, Condition.WALL_FORCES),
-    *(_scalar(path + entities.BAND, "two standard deviations below and above the curve") for path in entities.BANDED),
     Entity(entities.FORCE_DENSITY, "density of f_n over its mean, this frame", _POINTS, When.END),
     Entity(entities.FORCE_DENSITY_TAIL, "exponential tail above the mean, this frame", _STRIPS, When.END),
     Entity(entities.FORCE_DENSITY_TAIL_VALUE, "its exponent", _TICKS, When.END),
     Entity(entities.FORCE_DENSITY_POOLED, "the same, all frames so far", _STRIPS, When.END),
-    Entity(entities.FORCE_DENSITY_AXES, "axes", _STRIPS, When.STATIC),
-    Entity(entities.FORCE_DENSITY_TICKS, "their values", _TICKS, When.STATIC),
+    *_with_ticks(entities.FORCE_DENSITY_AXES, "axes", "their values"),
     Entity(entities.STRESS_CROSS, "principal stresses, length over the pressure", _STRIPS, When.END),
     Entity(entities.STRESS_VALUES, "their values [kPa]", _TICKS, When.END),
     Entity(entities.STRESS_CURVE, "normal stress over the pressure in every direction", _STRIPS, When.END),
     Entity(entities.STRESS_AXES, "circle of the pressure, axes", _STRIPS, When.STATIC),
     Entity(entities.ROSE, "directions of contacts with force, relative number", _STRIPS, When.END),
     Entity(entities.ROSE_OF_FORCES, "directions of contacts, weighted by f_n", _STRIPS, When.END),
-    Entity(entities.ROSE_AXES, "circle of an isotropic packing, axes", _STRIPS, When.STATIC),
-    Entity(entities.ROSE_TICKS, "names of the curves", _TICKS, When.STATIC),
+    *_with_ticks(entities.ROSE_AXES, "circle of an isotropic packing, axes", "names of the curves"),
     Entity(entities.RADIUS_CURVE, "coordination number over a common change of all radii", _STRIPS, When.STATIC,
            Condition.RADII),
     Entity(entities.RADIUS_FOUND, "the change that was applied", _POINTS, When.STATIC, Condition.RADII),
-    Entity(entities.RADIUS_AXES, "axes and the target coordination number", _STRIPS, When.STATIC, Condition.RADII),
-    Entity(entities.RADIUS_TICKS, "their values", _TICKS, When.STATIC, Condition.RADII),
+    *_with_ticks(entities.RADIUS_AXES, "axes and the target coordination number", "their values", Condition.RADII),
     *_maps(entities.KINEMATIC_MAPS, entities.KINEMATIC_LEGENDS, _KINEMATIC_MAPS, Condition.KINEMATICS),
     Entity(
         entities.FLUCTUATIONS, "fluctuations about the mean field, another colour in a shear band",
@@ -304,8 +303,7 @@ SCHEMA: tuple[Entity, ...] = (
            Condition.FRINGES),
     Entity(entities.FRINGES_OF_ALL, "the same of discs of all frames", _POINTS, When.STATIC, Condition.FRINGES),
     Entity(entities.FRINGE_CURVE, "the curve of the run", _STRIPS, When.STATIC, Condition.FRINGES),
-    Entity(entities.FRINGE_AXES, "axes", _STRIPS, When.STATIC, Condition.FRINGES),
-    Entity(entities.FRINGE_TICKS, "their values", _TICKS, When.STATIC, Condition.FRINGES),
+    *_with_ticks(entities.FRINGE_AXES, "axes", "their values", Condition.FRINGES),
     _scalar(entities.FRINGE_CORRELATION, "correlation of the sums by fringes and by forces over the discs", When.END,
             Condition.FRINGES),
     Entity(
@@ -343,11 +341,9 @@ SCHEMA: tuple[Entity, ...] = (
         _STRIPS | {"i", "j", "grain_a", "body_b", "fn_first", "fn_second", "ft_first", "ft_second"}, When.END,
         Condition.TRUTH,
     ),
-    Entity(entities.DIFFERENCE_LEGEND, "colour of the difference", _STRIPS, When.STATIC, Condition.TRUTH),
-    Entity(entities.DIFFERENCE_TICKS, "its values [N]", _TICKS, When.STATIC, Condition.TRUTH),
+    *_with_ticks(entities.DIFFERENCE_LEGEND, "colour of the difference", "its values [N]", Condition.TRUTH),
     Entity(entities.TRUTH_SCATTER, "inferred over true f_n", _POINTS, When.END, Condition.TRUTH),
-    Entity(entities.TRUTH_AXES, "axes and the line of equality", _STRIPS, When.STATIC, Condition.TRUTH),
-    Entity(entities.TRUTH_TICKS, "their values [N]", _TICKS, When.STATIC, Condition.TRUTH),
+    *_with_ticks(entities.TRUTH_AXES, "axes and the line of equality", "their values [N]", Condition.TRUTH),
     _scalar(entities.TRUTH_R_FN, "correlation of f_n with the truth", When.END, Condition.TRUTH),
     _scalar(entities.TRUTH_R_FT, "correlation of f_t with the truth", When.END, Condition.TRUTH),
     _scalar(entities.TRUTH_ERROR, "relative L2 error of (f_n, f_t)", When.END, Condition.TRUTH),

@@ -93,7 +93,7 @@ class FilmWriter:
             )
             top = f"≥ {style.range.top:.3g} {self._scene.force_unit}"
             texts = (("0", x[0]), (top, x[-1]), (label, float(bar[:, 0].mean())))
-            log_texts(stream, f"{path}/ticks", [(np.array([at, y[0]]), text, INK) for text, at in texts])
+            log_texts(stream, path + entities.TICKS, [(np.array([at, y[0]]), text, INK) for text, at in texts])
 
     def log(self, clock: Clock, forces: FrameForces) -> None:
         """Log one frame: its picture, static, if it has one; the nearest picture; the film of its sweeps."""

@@ -33,7 +33,7 @@ def log_legends(stream: rr.RecordingStream, scene: Scene) -> None:
     power = np.linspace(DECADES[0], DECADES[1], PIECES)
     decades = int(DECADES[1] - DECADES[0])
     log_ramp_legend(
-        stream, scene.canvas, entities.MAP_LEGEND, entities.MAP_LEGEND_TICKS, residual_colours(10.0**power),
+        stream, scene.canvas, entities.MAP_LEGEND, residual_colours(10.0**power),
         [(k / decades, text) for k, text in enumerate(_POWERS[-decades - 1 :])],
         [(k / decades, text, INK) for k, text in enumerate(_CHANGES[-decades - 1 :])],
     )  # fmt: skip
@@ -41,7 +41,7 @@ def log_legends(stream: rr.RecordingStream, scene: Scene) -> None:
     for name, colouring in COLOURINGS.items():
         path = f"{entities.COLOUR_LEGENDS}/{name}"
         colours = colouring.colours(fraction)
-        log_ramp_legend(stream, scene.canvas, path, f"{path}/ticks", colours, colouring.texts(scene))
+        log_ramp_legend(stream, scene.canvas, path, colours, colouring.texts(scene))
 
 
 def log_force_legend(stream: rr.RecordingStream, scene: Scene) -> None:
@@ -53,7 +53,7 @@ def log_force_legend(stream: rr.RecordingStream, scene: Scene) -> None:
     values = [(0.0, "0"), (mean, f"mean {mean:.3g} {unit}"), (0.5 * (top + mean), f"{0.5 * (top + mean):.3g}")]
     values.append((top, f"≥ {top:.3g} {unit}"))
     places = [(value / top, text) for value, text in values]
-    log_legend_texts(stream, scene.canvas, entities.FORCE_LEGEND_TICKS, places)
+    log_legend_texts(stream, scene.canvas, entities.FORCE_LEGEND + entities.TICKS, places)
     notes = [(0.98, "point: sliding", SLIDING)]
     if scene.tracks.boundary is not None:
         notes.append((0.75, "rim: boundary", BOUNDARY))
@@ -80,7 +80,7 @@ def _log_gap_key(stream: rr.RecordingStream, scene: Scene) -> None:
     texts = [
         (line.mean(axis=0) + below, text, INK) for line, (_, _, text) in zip(lines, GAP_KEY, strict=True)
     ]  # fmt: skip
-    log_texts(stream, entities.UNCERTAINTY_LEGEND_TICKS, texts)
+    log_texts(stream, entities.UNCERTAINTY_LEGEND + entities.TICKS, texts)
 
 
 def scale_bar_of(canvas: Canvas) -> tuple[float, str]:
@@ -111,4 +111,4 @@ def _log_gap_legend(stream: rr.RecordingStream, scene: Scene) -> None:
         (0.0, "new", NEW_CONTACT), (0.25, "- - lost", LOST), (0.57, "added", ADDED),
         (0.97, "- - forbidden", FORBIDDEN),
     ]  # fmt: skip
-    log_legend_texts(stream, scene.canvas, entities.GAP_LEGEND_TICKS, texts, notes)
+    log_legend_texts(stream, scene.canvas, entities.GAP_LEGEND + entities.TICKS, texts, notes)

@@ -71,7 +71,8 @@ _FORCES = [
     entities.SLIDING,
     f"{entities.FORCE_LEGEND}/**",
 ]
-_PLAIN_LEGEND = [entities.FORCE_LEGEND, entities.FORCE_LEGEND_TICKS]  # for views without edges, points and rims
+# For views without edges, points and rims.
+_PLAIN_LEGEND = [entities.FORCE_LEGEND, entities.FORCE_LEGEND + entities.TICKS]
 _UNIT_RANGE = (-0.04, 1.05)  # of an axis for fractions and correlations
 _RESIDUALS = (-6.4, 5.5)  # log10, with space for a legend above
 

@@ -8,6 +8,7 @@ from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMa
 from rerun.blueprint.visualizers import Visualizer  # pyright: ignore[reportPrivateImportUsage]
 
 from ...results.schema import unit_of
+from ..curve_layers.statistic_curves import CURVES
 from ..look import entities
 from ..look.canvas import Canvas
 from ..look.colours import BACKGROUND
@@ -15,6 +16,7 @@ from .axis_ranges import Extremes, range_with_legend
 
 WALL_KEY_BOUNDS = ((-60.0, 660.0), (0.0, 60.0))
 PLOT_HEIGHT = 300.0  # [px] height of a curve view by default
+BANDED = {curve.path for curve in CURVES}
 _TOP = (rrb.Corner2D.LeftTop, rrb.Corner2D.RightTop)
 
 
@@ -139,7 +141,7 @@ def curve_view(
     axis : TimeAxis, optional
         Range of the timeline; None: the whole test.
     """
-    bands = [path + entities.BAND for path in contents if path in entities.BANDED]
+    bands = [path + entities.BAND for path in contents if path in BANDED]
     if entries is None:
         entries = len(contents) if len(contents) > 1 else 0
     contents = [*bands, *contents]

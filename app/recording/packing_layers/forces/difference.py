@@ -38,7 +38,7 @@ def log_difference_legend(stream: rr.RecordingStream, scene: Scene, first: str, 
     """Log the colours of differences with the names of both fields, static."""
     fraction, limit = np.linspace(-1.0, 1.0, PIECES), difference_style(scene).range.top
     log_ramp_legend(
-        stream, scene.canvas, entities.DIFFERENCE_LEGEND, entities.DIFFERENCE_TICKS,
+        stream, scene.canvas, entities.DIFFERENCE_LEGEND,
         difference_colours(fraction * limit, limit),
         [(0.0, f"{second} more: {limit:.3g} N"), (0.5, "equal"), (1.0, f"{first} more: {limit:.3g} N")],
     )  # fmt: skip

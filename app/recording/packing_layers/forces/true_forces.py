@@ -32,9 +32,7 @@ class TruthWriter:
     def log_axes(self, stream: rr.RecordingStream) -> None:
         """Log axes of the scatter plot and the styles of the curves."""
         log_difference_legend(stream, self._scene, "inferred", "true")
-        log_scatter_axes(
-            stream, self._axes, entities.TRUTH_AXES, entities.TRUTH_TICKS, "true f_n [N]", "inferred f_n [N]"
-        )
+        log_scatter_axes(stream, self._axes, entities.TRUTH_AXES, "true f_n [N]", "inferred f_n [N]")
         for path, name, colour in (
             (entities.TRUTH_R_FN, "r(f_n)", SERIES[0]),
             (entities.TRUTH_R_FT, "r(f_t)", SERIES[1]),

@@ -47,7 +47,7 @@ class FringeMaps:
             each.log_legend(stream, self._scene)
         (_, right), (_, high) = self._axes.x_range, self._axes.y_range
         self._axes.log(
-            stream, entities.FRINGE_AXES, entities.FRINGE_TICKS, x_ticks=round_ticks(0.0, right, 3.0),
+            stream, entities.FRINGE_AXES, x_ticks=round_ticks(0.0, right, 3.0),
             y_ticks=round_ticks(0.0, high, 3.0),
             notes=[
                 (0.78 * right, 0.1 * high, "across: G² of a disc", INK),

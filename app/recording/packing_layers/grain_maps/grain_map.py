@@ -47,7 +47,7 @@ class GrainMap:
         """Log the line of colours with its values, static."""
         fraction = np.linspace(0.0, 1.0, PIECES)
         value = ((2.0 * fraction - 1.0) if self._signed else fraction) * self.top
-        log_ramp_legend(stream, scene.canvas, self.legend, f"{self.legend}/ticks", self.colours(value), self._texts())
+        log_ramp_legend(stream, scene.canvas, self.legend, self.colours(value), self._texts())
 
     def log(self, clock: Clock, scene: Scene, value: Array) -> None:
         """Log the grains of one frame with their values (n,) as displayed, NaN: unknown; the clock is at its start."""

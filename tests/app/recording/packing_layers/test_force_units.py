@@ -29,7 +29,7 @@ def test_legends_captions_and_the_summary_have_the_unit(tmp_path, loaded, config
     results = replace(results, walls=walls, configuration=configuration)
     assert results.force_unit == unit
     path = write_recording(results, tmp_path / "run.rrd").path
-    for entity in (entities.FORCE_LEGEND_TICKS, f"{entities.FILM_KEY}/ticks"):
+    for entity in (entities.FORCE_LEGEND + entities.TICKS, entities.FILM_KEY + entities.TICKS):
         assert any(text.startswith("≥ ") and text.endswith(f" {unit}") for text in labels(path, entity)), entity
     assert f"mean f_n {results.statistics[1].mean_fn:.3g} {unit}" in text_of(path, entities.FRAME_CARD)
     summary = text_of(path, "/summary")
