@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from .process.counts import state_count
 from .solver.bodies.grains import Array
 from .solver.bodies.wall_shapes import STRAIGHT, all_sides, circle_parameters, outlines
+from .solver.bodies.walls import Walls
 from .solver.quantity import Quantity, quantities
 
 BAR, CORNER, UNSPECIFIED = 0, 1, -1  # meaning of the two points of a wall
@@ -319,6 +320,11 @@ class WallTracks:
     def force_unit(self, weight: Array) -> str:
         """Return the unit of forces: arbitrary where neither a load nor the weight (n, 2) [N] sets their scale."""
         return "N" if self.loaded.any() or weight.any() else "a.u."
+
+    def at_rest(self, frame: int, load: Array | None = None) -> Walls:
+        """Return the walls, or the cell, of a frame for measurements, with loads (w,) [N] if given."""
+        cell = None if self.cell is None else self.cell[frame]
+        return Walls.at_rest(self.endpoints[frame], load, self.side, cell)
 
     def outlines(self, frame: int) -> list[Array]:
         """Return the lines (p, 2) [m] that draw the walls of a frame."""

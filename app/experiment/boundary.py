@@ -97,7 +97,7 @@ def _near_boundary(tracks: Tracks, surface: FreeSurface) -> NDArray[np.bool_]:
 def _surface(tracks: Tracks, walls: WallTracks | None) -> FreeSurface:
     bounds = Walls.at_rest(np.empty((0, 2, 2)))
     if walls is not None and not np.isnan(walls.endpoints[0]).any():
-        bounds = Walls.at_rest(walls.endpoints[0], side=walls.side)
+        bounds = walls.at_rest(0)
     return find_outer_grains(tracks.radius, tracks.position[0], tracks.present[0], bounds)
 
 

@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from ..drawing.force_range import DIFFERENCE_FRACTION, ForceRange
 from ..results.comparison import Comparison
 from ..results.results import Results
-from ..solver.bodies.walls import Walls
 from ..solver.contacts.contacts import measure_pairs
 from ..solver.contacts.pairs import align
 from .figure_style import Width, add_title, new_figure
@@ -40,10 +39,7 @@ def draw_difference(comparison: Comparison, frame: int, width: Width) -> Figure:
     key, ours, theirs = align(
         first.contacts.key, np.nan_to_num(first.fn), second.contacts.key, np.nan_to_num(second.fn)
     )  # fmt: skip
-    walls = base.walls
-    cell = None if walls.cell is None else walls.cell[frame]
-    at_rest = Walls.at_rest(walls.endpoints[frame], side=walls.side, cell=cell)
-    contacts = measure_pairs(base.grains, base.tracks.position[frame], at_rest, key)
+    contacts = measure_pairs(base.grains, base.tracks.position[frame], base.walls.at_rest(frame), key)
     drawn = np.flatnonzero(np.isfinite(contacts.point).all(axis=1))
     difference = (ours - theirs)[drawn]
     order = np.argsort(np.abs(difference))

@@ -17,7 +17,6 @@ from ..inference.solve_frames import InferenceObserver
 from ..process.errors import InputError
 from ..results.hdf5.lazy_sequences import LazySequence
 from ..results.results import Results
-from ..reviewing.judging.candidate_pairs import walls_at
 from ..solver.bodies.wall_shapes import IN, OUT, STRAIGHT
 from ..solver.contacts.contacts import Contacts, measure_contacts
 from ..solver.contacts.pairs import find_rows, split_key, split_keys
@@ -142,7 +141,7 @@ def _check_pairs(results: Results, frames: Sequence[int], forbidden: np.ndarray,
         raise InputError("what_if", f"force = {_names(bodies, int(both[0]))}", "is forbidden as well")
     i, j = split_keys(forced, bodies.count)
     for k in frames if len(forced) else ():
-        gap = measure_contacts(results.grains, results.tracks.position[k], walls_at(results, k), i, j).gap
+        gap = measure_contacts(results.grains, results.tracks.position[k], results.walls.at_rest(k), i, j).gap
         far = np.flatnonzero(gap > results.tracks.radius[i])
         if len(far):
             apart = 1e3 * float(gap[far[0]])
@@ -275,7 +274,7 @@ def _with_steps(
     for row, step in steps.items():
         position[row] += step
     contacts = forces.contacts
-    moved = measure_contacts(results.grains, position, walls_at(results, frame), contacts.i, contacts.j)
+    moved = measure_contacts(results.grains, position, results.walls.at_rest(frame), contacts.i, contacts.j)
     rows = np.flatnonzero(np.isin(contacts.i, list(steps)) | np.isin(contacts.j, list(steps)))
     if not len(rows):
         return contacts, forces.fn, forces.ft

@@ -11,7 +11,6 @@ from scipy.spatial import KDTree
 
 from ..process.counts import state_count
 from ..solver.bodies.grains import Array
-from ..solver.bodies.walls import Walls
 from ..solver.contacts.contacts import Contacts, measure_contacts
 from ..solver.contacts.pairs import make_keys
 from ..solver.statistics.agreement import Agreement, compare_forces
@@ -184,7 +183,7 @@ def _frame_on(
     known = (i >= 0) & (j >= 0)
     low, high = np.minimum(i, j)[known], np.maximum(i, j)[known]
     order = np.argsort(make_keys(low, high, base.grains.count + base.walls.count), kind="stable")
-    walls = _walls_at(base, frame)
+    walls = base.walls.at_rest(frame)
     contacts = measure_contacts(base.grains, base.tracks.position[frame], walls, low[order], high[order])
     fn, ft = np.asarray(fn)[known][order], np.asarray(ft)[known][order]
     return FieldFrame(contacts, fn, ft, np.nan, np.nan), int((~known).sum())
@@ -194,15 +193,9 @@ def _with_angles(base: Results, frame: int, field: FieldFrame) -> FieldFrame:
     position, present = base.tracks.position[frame], base.tracks.present[frame]
     drawable = np.flatnonzero(np.isfinite(field.contacts.normal).all(axis=1))
     contacts, fn, ft = field.contacts.select(drawable), field.fn[drawable], field.ft[drawable]
-    walls = _walls_at(base, frame)
+    # Plates have a load of one: only the fact of a load is used.
+    walls = base.walls.at_rest(frame, np.where(base.walls.loaded, 1.0, np.nan))
     area = packing_area(walls, position, present, base.tracks.boundary)
     stress = love_weber_stress(contacts, fn, ft, position, area, 1.0)  # a ratio: the length of the rods cancels
     ratio = wall_ratio_angle(walls, sums_on_walls(contacts, fn, ft))
     return replace(field, friction_angle=friction_angle(stress), wall_ratio_angle=ratio)
-
-
-def _walls_at(base: Results, frame: int) -> Walls:
-    """Return the walls of a frame at rest, plates with a load of one: only the fact of a load is used."""
-    walls = base.walls
-    cell = None if walls.cell is None else walls.cell[frame]
-    return Walls.at_rest(walls.endpoints[frame], np.where(walls.loaded, 1.0, np.nan), walls.side, cell)

@@ -14,7 +14,6 @@ from jaxtyping import Float
 from ..process.atomic import write_atomically
 from ..solver.assessment.intervals.statistic_intervals import CONSTANT
 from ..solver.bodies.packing import fraction_on_free_grains
-from ..solver.bodies.walls import Walls
 from ..solver.frame_forces import ERROR_PARTS, FrameForces, FrameStatus
 from ..solver.statistics.agreement import Agreement
 from ..solver.statistics.frame_statistics import FrameStatistics
@@ -223,7 +222,7 @@ def _friction(results: Results) -> dict[str, Any] | None:
 def _loads(results: Results) -> list[dict[str, Any]]:
     """Return the load on every plate [N] with what it follows from; measured ones as mean and range."""
     walls, length, found = results.walls, setting(results.configuration, "material", "length"), []
-    first = Walls.at_rest(walls.endpoints[0], side=walls.side)
+    first = walls.at_rest(0)
     width = first.face
     free = fraction_on_free_grains(results.grains, first, results.tracks.position[0], results.tracks.present[0])
     for w, name in enumerate(walls.name):
@@ -251,7 +250,7 @@ def press_from_above(
     if not size > 0.0 or walls.count == 0:
         return {}
     up = -weight / size
-    first = Walls.at_rest(walls.endpoints[0], side=walls.side)
+    first = walls.at_rest(0)
     above = (first.outward @ up > ABOVE) & ~first.curved & ~walls.loaded
     lifted = force @ up
     solved = lifted[np.isfinite(lifted).all(axis=1)]

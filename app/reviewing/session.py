@@ -19,7 +19,7 @@ from ..solver.contacts.pairs import Keys, match_values, split_key
 from ..verdicts.log import Body, Entry, Flag, Origin, Pair, Verdict, canonical
 from ..verdicts.reviewers import reviewer_kappas
 from .agreement import detected_by_name
-from .judging.candidate_pairs import CandidatePairs, find_candidate_pairs, gap_standard_deviation, walls_at
+from .judging.candidate_pairs import CandidatePairs, find_candidate_pairs, gap_standard_deviation
 from .judging.estimate import NO, UNJUDGED, YES, estimate_detector
 from .judging.picking import gap_at, nearest_candidate
 from .judging.queue import Queue, frame_queue, influence_priority, influence_queue, sampled_queue
@@ -223,7 +223,7 @@ class ReviewSession:
         keys = np.concatenate([influence_queue(self.results, found, blind=view.blind).key, others]).astype(np.int64)
         keys = keys[:MOST_LISTED]
         pairs = measure_pairs(
-            self.results.grains, self.results.tracks.position[frame], walls_at(self.results, frame), keys
+            self.results.grains, self.results.tracks.position[frame], self.results.walls.at_rest(frame), keys
         )
         # measure_pairs sorts its pairs by key
         row = np.searchsorted(pairs.key, keys)
@@ -335,7 +335,7 @@ class ReviewSession:
         i, j = split_key(key, self.bodies.count)
         if not 0 <= i < min(j, self.results.grains.count) or not self._both_present(frame, key):
             raise UnknownPair(f"there is no pair {key} in frame {frame}")
-        position, walls = self.results.tracks.position[frame], walls_at(self.results, frame)
+        position, walls = self.results.tracks.position[frame], self.results.walls.at_rest(frame)
         return measure_pairs(self.results.grains, position, walls, np.array([key], np.int64))
 
     def _both_present(self, frame: int, key: int) -> bool:

@@ -8,7 +8,6 @@ import numpy as np
 
 from ...results.results import Results, TruthContacts
 from ...solver.bodies.grains import Array, Grains
-from ...solver.bodies.walls import Walls
 from ...solver.contacts.contacts import measure_pairs
 from ...solver.contacts.pairs import are_present
 from ...solver.statistics.stress import friction_angle, love_weber_stress, principal_stresses
@@ -59,9 +58,7 @@ def _of_true_forces(results: Results, truth: TruthContacts) -> list[Array | None
         if not len(here):
             stresses.append(None)
             continue
-        cell = None if results.walls.cell is None else results.walls.cell[k]
-        walls = Walls.at_rest(results.walls.endpoints[k], None, results.walls.side, cell)
         position = results.tracks.position[k]
-        contacts = measure_pairs(grains, position, walls, key[here])
+        contacts = measure_pairs(grains, position, results.walls.at_rest(k), key[here])
         stresses.append(love_weber_stress(contacts, force[here, 0], force[here, 1], position, 1.0, 1.0))
     return stresses

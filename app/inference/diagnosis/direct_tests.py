@@ -14,7 +14,6 @@ from ...solver.bodies.outer_grains import find_outer_grains
 from ...solver.bodies.rods import RodMaterial
 from ...solver.bodies.strain import displacement_gradient, inertial_time, shear_strain
 from ...solver.bodies.wall_shapes import STRAIGHT, behind_body, outward_normals
-from ...solver.bodies.walls import Walls
 from ...solver.contacts.contacts import detect_contacts
 from ...tracks import Tracks, WallTracks
 from ..correction.radii import NAMED, find_oversized_rods, find_wrong_sizes
@@ -290,8 +289,7 @@ def examine_load(tracks: Tracks, walls: WallTracks, material: RodMaterial) -> li
     bounded = tracks.boundary is not None or walls.cell is not None
     if loaded or bounded or any(material.gravity) or not walls.count or np.isnan(walls.endpoints[0]).any():
         return []
-    bounds = Walls.at_rest(walls.endpoints[0], side=walls.side)
-    surface = find_outer_grains(tracks.radius, tracks.position[0], tracks.present[0], bounds)
+    surface = find_outer_grains(tracks.radius, tracks.position[0], tracks.present[0], walls.at_rest(0))
     sides = surface.sides(~surface.inner)
     if len(sides) != 1:
         return []

@@ -115,7 +115,7 @@ def log_statistics(clock: Clock, scene: Scene, statistics: FrameStatistics) -> N
         log_scalar(clock, path, float(value))
     for path, ends in band_values(statistics):
         log_scalars(clock, path, ends)
-    walls = scene.walls_at(clock.frame)
+    walls = scene.walls.at_rest(clock.frame)
     for path, values in wall_values(walls, statistics):
         log_scalars(clock, path, values)
     if scene.walls.force is not None:

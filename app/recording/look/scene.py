@@ -12,7 +12,6 @@ from ...results.results import TruthContacts, grain_weight, setting
 from ...solver.assessment.fringe_pressures import FringePressures
 from ...solver.bodies.cell import Cell
 from ...solver.bodies.grains import Array, Grains
-from ...solver.bodies.walls import Walls
 from ...solver.contacts.contacts import Contacts
 from ...solver.contacts.radius_tuning import RadiusTuning
 from ...solver.kinematics.sequence_kinematics import SequenceKinematics
@@ -64,12 +63,6 @@ class Scene:
         """Return the names of bodies by row: the id of a grain, the name of a wall."""
         n = self.grains.count
         return [printable(self.walls.name[b - n]) if b >= n else str(self.tracks.id[b]) for b in bodies.tolist()]
-
-    def walls_at(self, frame: int) -> Walls:
-        """Return the walls, or the cell, of one frame at rest: for measurements, not for a solve."""
-        walls = self.walls
-        cell = None if walls.cell is None else walls.cell[frame]
-        return Walls.at_rest(walls.endpoints[frame], side=walls.side, cell=cell)
 
     def branches(self, frame: int, contacts: Contacts) -> NDArray[np.float32]:
         """Return the lines of contacts (c, 2, 2) in [px]."""

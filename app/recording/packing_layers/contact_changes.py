@@ -96,6 +96,6 @@ def _log_gaps(clock: Clock, scene: Scene, contacts: Contacts) -> None:
 def _branches_now(scene: Scene, frame: int, ended: Contacts) -> NDArray[np.float32]:
     """Return the branches of contacts of the frame before at the present positions, those of lost grains left out."""
     ended = ended.select(are_present(ended.key, scene.tracks.present_in(frame), ended.body_count))
-    walls = scene.walls_at(frame)
+    walls = scene.walls.at_rest(frame)
     now = measure_contacts(scene.grains, scene.tracks.position[frame], walls, ended.i, ended.j)
     return scene.branches(frame, now)

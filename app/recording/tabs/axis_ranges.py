@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...solver.bodies.walls import Walls
 from ...solver.frame_forces import FrameForces
 from ...solver.statistics.frame_statistics import FrameStatistics
 from ...tracks import WallTracks
@@ -37,7 +36,7 @@ class CurveExtremes:
             values.append((entities.EXPECTED_COUNT, float(np.nansum(forces.probability))))
         if frame:
             values.append((entities.SIMILARITY, forces.similarity))
-        walls = Walls.at_rest(self._walls.endpoints[frame], side=self._walls.side)
+        walls = self._walls.at_rest(frame)
         for path, several in (*wall_values(walls, statistics), *band_values(statistics)):
             values += [(path, float(value)) for value in several]
         if self._walls.force is not None:

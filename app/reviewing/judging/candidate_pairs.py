@@ -11,7 +11,6 @@ from scipy.special import ndtr
 
 from ...results.results import Results
 from ...solver.bodies.grains import Array
-from ...solver.bodies.walls import Walls
 from ...solver.contacts.contacts import Contacts, ContactSource, detect_contacts, measure_pairs
 from ...solver.contacts.pairs import are_among, are_present, join_keys, make_key, match_values
 from ...solver.contacts.verdicts import DETECTED
@@ -64,7 +63,7 @@ def find_candidate_pairs(results: Results, frame: int, threshold: float | None =
     position, present = tracks.position[frame], tracks.present_in(frame)
     position_sd = float(tracks.frame(frame).position_sigma[0])
     threshold = THRESHOLD_STANDARD_DEVIATIONS * position_sd if threshold is None else threshold
-    walls = walls_at(results, frame)
+    walls = results.walls.at_rest(frame)
     listed = results.frames[frame].contacts
     near = detect_contacts(
         results.grains, position, present, walls, threshold + REACH * position_sd * np.sqrt(2.0),
@@ -78,12 +77,6 @@ def find_candidate_pairs(results: Results, frame: int, threshold: float | None =
     return CandidatePairs(frame, contacts, gap_sd, probability, detected, threshold)
 
 
-def walls_at(results: Results, frame: int) -> Walls:
-    """The walls of one frame, at rest."""
-    cell = None if results.walls.cell is None else results.walls.cell[frame]
-    return Walls.at_rest(results.walls.endpoints[frame], side=results.walls.side, cell=cell)
-
-
 def gap_in_radii(results: Results, frame: int, i: int, j: int) -> float:
     """Gap between two bodies, given by their rows, over the mean radius of the grains of both; NaN: one is not seen."""
     tracks, n = results.tracks, results.grains.count
@@ -92,7 +85,7 @@ def gap_in_radii(results: Results, frame: int, i: int, j: int) -> float:
     if not tracks.present_in(frame)[grains].all():
         return math.nan
     key = np.array([make_key(i, j, n + results.walls.count)])
-    measured = measure_pairs(results.grains, tracks.position[frame], walls_at(results, frame), key)
+    measured = measure_pairs(results.grains, tracks.position[frame], results.walls.at_rest(frame), key)
     return float(measured.gap[0] / results.grains.radius[grains].mean())
 
 

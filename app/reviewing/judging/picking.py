@@ -7,7 +7,7 @@ import numpy as np
 from ...results.results import Results
 from ...solver.bodies.grains import Array
 from ...solver.contacts.contacts import Contacts, detect_contacts
-from .candidate_pairs import CandidatePairs, walls_at
+from .candidate_pairs import CandidatePairs
 
 NEAR = 0.45  # [mean radius] largest distance of a click from the point of a candidate pair
 WIDEST_GAP = 0.25  # [mean radius] between two bodies that a click can join
@@ -40,5 +40,5 @@ def pairs_within(results: Results, frame: int, gap: float) -> Contacts:
     """Find all pairs of one frame whose gap is below a length [m]."""
     tracks = results.tracks
     return detect_contacts(
-        results.grains, tracks.position[frame], tracks.present_in(frame), walls_at(results, frame), gap
+        results.grains, tracks.position[frame], tracks.present_in(frame), results.walls.at_rest(frame), gap
     )

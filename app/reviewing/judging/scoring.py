@@ -19,7 +19,7 @@ from ...solver.contacts.pairs import are_among, are_present, join_keys, match_va
 from ...solver.even_subset import even_subset
 from ...verdicts.decisions import Decisions, decide
 from ..reviewed_run import ReviewedRun
-from .candidate_pairs import CandidatePairs, find_candidate_pairs, walls_at
+from .candidate_pairs import CandidatePairs, find_candidate_pairs
 from .estimate import NO, UNJUDGED, YES, DetectorEstimate, estimate_detector
 from .queue import strata
 from .threshold import ThresholdCurve, ThresholdFit, even_thresholds, fit_threshold, threshold_curve
@@ -196,7 +196,7 @@ def _pairs_of(run: ReviewedRun, candidates: CandidatePairs, decisions: Decisions
     yes, no = decisions.forced(frame), decisions.forbidden(frame)
     key = join_keys(candidates.key, yes, no)
     key = key[are_present(key, results.tracks.present_in(frame), candidates.contacts.body_count)]
-    contacts = measure_pairs(results.grains, results.tracks.position[frame], walls_at(results, frame), key)
+    contacts = measure_pairs(results.grains, results.tracks.position[frame], results.walls.at_rest(frame), key)
     stratum = match_values(key, candidates.key, strata(candidates), fill=-1)
     detected = match_values(key, candidates.key, candidates.detected, fill=False)
     probability = match_values(key, candidates.key, candidates.probability)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...results.results import Results
-from ...reviewing.judging.candidate_pairs import gap_standard_deviation, walls_at
+from ...reviewing.judging.candidate_pairs import gap_standard_deviation
 from ...reviewing.rounding import rounded, rounded_one
 from ...solver.contacts.contacts import measure_pairs
 from ...solver.contacts.pairs import match_values
@@ -35,7 +35,7 @@ def pair_history(results: Results, i: Body, j: Body) -> dict[str, Any] | None:
     for frame in range(len(results.frames)):
         tracks, forces = results.tracks, results.frames[frame]
         here = all(row >= n or bool(tracks.frame(frame).present[0, row]) for row in (a, b))
-        measured = measure_pairs(results.grains, tracks.position[frame], walls_at(results, frame), key)
+        measured = measure_pairs(results.grains, tracks.position[frame], results.walls.at_rest(frame), key)
         values["gap"] += rounded(measured.gap if here else [np.nan])
         values["gap_sd"] += rounded(gap_standard_deviation(measured, float(tracks.frame(frame).position_sigma[0])))
         for name in ("fn", "fn_sd", "ft", "ft_sd", "probability"):

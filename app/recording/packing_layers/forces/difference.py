@@ -60,7 +60,7 @@ def log_difference(clock: Clock, scene: Scene, path: str, key: NDArray[np.int64]
     fn, ft : array (2, u)
         Forces of the first and the second field [N], 0 without contact.
     """
-    contacts = measure_pairs(scene.grains, scene.tracks.position[clock.frame], scene.walls_at(clock.frame), key)
+    contacts = measure_pairs(scene.grains, scene.tracks.position[clock.frame], scene.walls.at_rest(clock.frame), key)
     shown = np.flatnonzero(np.isfinite(contacts.point).all(axis=1))
     contacts, fn, ft = contacts.select(shown), fn[:, shown], ft[:, shown]
     difference, style = fn[0] - fn[1], difference_style(scene)

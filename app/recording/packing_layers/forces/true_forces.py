@@ -51,7 +51,7 @@ class TruthWriter:
         contacts = measure_contacts(
             scene.grains,
             scene.tracks.position[clock.frame],
-            scene.walls_at(clock.frame),
+            scene.walls.at_rest(clock.frame),
             truth.i[shown],
             truth.j[shown],
         )
