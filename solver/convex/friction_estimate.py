@@ -19,7 +19,7 @@ from ..bodies.grains import Array
 from ..contacts.contacts import Contacts
 from ..nlgs.force_memory import ForceMemory
 from ..parallel import parallel_map
-from .program import Balance, ConvexSettings, solve_convex_member
+from .program import Balance, solve_convex_member
 
 # Of the assumed coefficient; only those about the minimum are tried.
 FACTORS = (
@@ -79,7 +79,6 @@ def relative_power_gap(slip: Array, friction: Array, fn: Array, ft: Array) -> fl
 def estimate_friction(
     frames: Sequence[SlidingFrame],
     factors: Sequence[float] = FACTORS,
-    settings: ConvexSettings | None = None,
     *,
     of_walls: bool = False,
     workers: int | None = 1,
@@ -108,9 +107,7 @@ def estimate_friction(
     trial = np.sort(np.asarray(factors, dtype=np.float64))
     if not len(frames) or len(trial) < 3:
         raise ValueError("friction needs at least one frame and three trial factors")
-    trial, gap = _bracket_minimum(
-        trial, lambda factor: np.array(_power_gaps(frames, factor, settings, of_walls)), workers
-    )
+    trial, gap = _bracket_minimum(trial, lambda factor: np.array(_power_gaps(frames, factor, of_walls)), workers)
     gap = gap[np.isfinite(gap).all(axis=1)]
     if not len(gap):
         return FrictionEstimate(np.nan, np.nan, trial, np.full(len(trial), np.nan), False)
@@ -148,27 +145,20 @@ def _bracket_minimum(trial: Array, gaps_of: Callable[[float], Array], workers: i
     return trial[first : last + 1], gap
 
 
-def _power_gaps(
-    frames: Sequence[SlidingFrame], factor: float, settings: ConvexSettings | None, of_walls: bool
-) -> list[float]:
+def _power_gaps(frames: Sequence[SlidingFrame], factor: float, of_walls: bool) -> list[float]:
     scales = [np.where(frame.contacts.with_wall | (not of_walls), factor, 1.0) for frame in frames]
     return power_gaps(
-        [
-            replace(frame, balance=replace(frame.balance, friction=scale * frame.balance.friction))
-            for frame, scale in zip(frames, scales, strict=True)
-        ],
-        settings,
+        replace(frame, balance=replace(frame.balance, friction=scale * frame.balance.friction))
+        for frame, scale in zip(frames, scales, strict=True)
     )
 
 
-def power_gaps(frames: Iterable[SlidingFrame], settings: ConvexSettings | None = None) -> list[float]:
+def power_gaps(frames: Iterable[SlidingFrame]) -> list[float]:
     """Relative power gaps of the forces of least gap, each frame continuing from the forces of the one before."""
     memory, gaps = ForceMemory.empty(), []
     for frame in frames:
         previous = memory.recall(frame.contacts)
-        forces = solve_convex_member(
-            frame.balance, frame.slip, frame.probability, previous[:, 0], previous[:, 1], settings
-        )
+        forces = solve_convex_member(frame.balance, frame.slip, frame.probability, previous[:, 0], previous[:, 1])
         all_present = np.ones(frame.contacts.grain_count, dtype=bool)
         memory = memory.renew(frame.contacts, np.column_stack([forces.fn, forces.ft]), all_present)
         gaps.append(relative_power_gap(frame.slip, frame.balance.friction, forces.fn, forces.ft))

@@ -20,7 +20,7 @@ from ..bodies.grains import Array
 from ..parallel import parallel_map
 from .friction_estimate import SlidingFrame, power_gaps
 from .grain_blocks import block_balance
-from .program import Balance, ConvexSettings
+from .program import Balance
 
 # `all_friction` is that of grains, with that of walls in its given proportion.
 Parameter = Literal["friction", "all_friction", "wall_friction", "base_drag", "attraction", "rolling"]
@@ -113,11 +113,11 @@ class _Search:
         return self.known[model]
 
 
-def power_gap(frames: Sequence[ResistedFrame], model: SlidingModel, settings: ConvexSettings | None = None) -> float:
+def power_gap(frames: Sequence[ResistedFrame], model: SlidingModel) -> float:
     """Mean relative power gap of the forces of least gap under a model; NaN where nothing slides."""
     if not frames:
         return np.nan
-    return float(np.mean(power_gaps((each.under(model) for each in frames), settings)))
+    return float(np.mean(power_gaps(each.under(model) for each in frames)))
 
 
 def fit_model(frames: Sequence[ResistedFrame], start: SlidingModel, free: Sequence[Parameter]) -> FittedModel:

@@ -51,7 +51,6 @@ class FramePosterior:
     centre_error: Float[Array, "n 2"]  # [m] measured minus true centre
     radius_error: Float[Array, " n"]  # [m] true minus given radius
     overlap: float  # [m] of a contact with the mean force, linear
-    overlap_sd: float  # [m]
     offset: float  # [m] by which all gaps are too large
     offset_sd: float  # [m]
     trust: float  # correlation with the truth that the posterior itself expects
@@ -102,7 +101,7 @@ def _summarise(evidence: FrameEvidence, chains: list[ChainMeans]) -> FramePoster
     unit, diameter = evidence.known.unit, evidence.diameter
     pair = np.mean([chain.pair for chain in chains], axis=0)
     error = np.mean([chain.error for chain in chains], axis=0)
-    kappa, kappa2, offset, offset2 = np.mean([chain.common for chain in chains], axis=0)
+    kappa, _, offset, offset2 = np.mean([chain.common for chain in chains], axis=0)
     bearing_probability, fn, ft = pair[:, 0], pair[:, 1], pair[:, 2]
     variance = np.maximum(pair[:, 3] - fn**2, 0.0)
     variance_t = np.maximum(pair[:, 4] - ft**2, 0.0)
@@ -119,7 +118,6 @@ def _summarise(evidence: FrameEvidence, chains: list[ChainMeans]) -> FramePoster
         centre_error=diameter * error[:, :2],
         radius_error=diameter * error[:, 2],
         overlap=diameter * kappa * mean_force,
-        overlap_sd=diameter * mean_force * float(np.sqrt(max(kappa2 - kappa**2, 0.0))),
         offset=diameter * offset,
         offset_sd=diameter * float(np.sqrt(max(offset2 - offset**2, 0.0))),
         trust=float(np.sqrt(between_pairs / total)) if total > 0.0 else 0.0,

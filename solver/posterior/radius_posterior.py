@@ -40,9 +40,6 @@ class RadiusPosterior:
     correction: Float[Array, " n"]  # [m] from given to true radius, mean over the draws
     correction_sd: Float[Array, " n"]  # [m] standard deviation of the remaining error
     prior_sd: float  # [m] standard deviation of the errors of the given radii; 0: exact within the noise
-    # Whether the correction contains an error that all gaps share. Its parts that vary over the picture are still in
-    # the gaps: pass a `shared_error` when evidence is gathered again.
-    includes_shared: bool
 
 
 def has_radius_errors(packing: Packing, snapshots: Sequence[Snapshot]) -> bool:
@@ -86,7 +83,7 @@ def estimate_radii(
     evidence = gather_position_evidence(packing, snapshots, settings, shared_error=shared_error)
     shared, sd = evidence.radius_correction, evidence.radius_sd
     if not _is_detectable(evidence):
-        return RadiusPosterior(shared, np.full(len(shared), sd), sd, evidence.corrected)
+        return RadiusPosterior(shared, np.full(len(shared), sd), sd)
     chain = _run_joint_chain(evidence, rows, rng)
     diameter = 2.0 * float(packing.grains.radius.mean())
     mean, square = chain.error[: len(shared), 2], chain.error[: len(shared), 3]
@@ -94,7 +91,7 @@ def estimate_radii(
     # The first estimate is too small, because gaps that an error widens count as open; the draws contain the errors.
     sd = max(sd, diameter * float(np.sqrt(square.mean())))
     correction_sd = np.minimum(RADIUS_COVERAGE_FACTOR * sampled, sd)
-    return RadiusPosterior(shared + diameter * mean, correction_sd, sd, evidence.corrected)
+    return RadiusPosterior(shared + diameter * mean, correction_sd, sd)
 
 
 def share_errors(found: RadiusPosterior, size_class: Int[np.ndarray, " n"]) -> RadiusPosterior:

@@ -51,8 +51,7 @@ class SequenceEvidence:
     noise: GapNoise
     touching: TouchingGaps  # before the correction
     reach: float  # [m] of corrected gaps
-    corrected: bool  # whether an error that all gaps share was subtracted
-    radius_correction: Float[Array, " n"]  # [m] that correction, per radius; zero if not corrected
+    radius_correction: Float[Array, " n"]  # [m] an error that all gaps share, per radius; zero if none was subtracted
     centre_sd: Float[Array, " f"]  # [m] standard deviation of an error of a centre's coordinate
     radius_sd: float  # [m] of an error of a radius
     offset_sd: float  # [m] of an error that all gaps still share
@@ -62,7 +61,6 @@ class SequenceEvidence:
         self,
         k: int,
         *,
-        wall_normal_total: float | None = None,
         verdicts: Verdicts = NO_VERDICTS,
         fringes: FringeCalibration | None = None,
     ) -> FrameEvidence:
@@ -72,8 +70,6 @@ class SequenceEvidence:
         ----------
         k : int
             Frame.
-        wall_normal_total : float, optional
-            Known sum [N] of f_n over all walls, used where neither a load nor weight is known.
         verdicts : Verdicts
             Reviewed pairs: forbidden ones are left out, forced ones have the prior probability REVIEWED_PRIOR.
         fringes : FringeCalibration, optional
@@ -88,7 +84,7 @@ class SequenceEvidence:
         contacts = measure_pairs(packing.grains, snapshot.position, walls, self.key[rows])
         contacts = replace(contacts, gap=self.gap[k, rows])
         n = packing.grains.count
-        known = _known_forces(packing, walls, contacts, wall_normal_total)
+        known = _known_forces(packing, walls, contacts)
         pressure, pressure_sd = self._pressures(k, fringes)
         return FrameEvidence(
             contacts=contacts,
@@ -191,7 +187,6 @@ def gather_position_evidence(
     return SequenceEvidence(
         packing, snapshots, series.key, gap - error, series.gap - error, noise, touching,
         reach=wide - (touching.offset if corrected else 0.0),
-        corrected=corrected,
         radius_correction=_radius_correction(packing, touching, corrected),
         centre_sd=centre,
         radius_sd=radius_sd,
@@ -256,8 +251,8 @@ def _radius_correction(packing: Packing, touching: TouchingGaps, corrected: bool
     return 0.5 * touching.offset + touching.slope[0] * (radius / radius.mean() - 1.0)
 
 
-def _known_forces(packing: Packing, walls: Walls, contacts: Contacts, wall_normal_total: float | None) -> KnownForces:
-    """Collect the loads of plates, or else the sum over all walls; the unit is near the mean force."""
+def _known_forces(packing: Packing, walls: Walls, contacts: Contacts) -> KnownForces:
+    """Collect the loads of plates; the unit is near the mean force."""
     n, diameter = packing.grains.count, 2.0 * float(packing.grains.radius.mean())
     j, plates = contacts.j, np.flatnonzero(walls.loaded)
     group, total, factor = np.full(len(j), -1, np.int64), walls.load[plates], np.ones(len(j))
@@ -270,9 +265,6 @@ def _known_forces(packing: Packing, walls: Walls, contacts: Contacts, wall_norma
     elif np.any(packing.weight):
         # Half the weight of n grains rests on a row of √n grains.
         unit = float(np.linalg.norm(packing.weight, axis=1).mean()) * 0.5 * np.sqrt(n)
-    elif wall_normal_total is not None and np.any(j >= n):
-        group[j >= n], total = 0, np.array([wall_normal_total])
-        unit = wall_normal_total / np.count_nonzero(j >= n)
     else:
         unit = 1.0
     return KnownForces(unit, packing.weight, group, total, factor)

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 
 from ..bodies.grains import Array, Grains
 from ..contacts.contacts import Contacts
-from .nearest_forces import nearest_forces, neighbourhood, resultants
+from .nearest_forces import REACH, nearest_forces, neighbourhood, resultants
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class Removal:
 
 
 def remove_contact(
-    grains: Grains, contacts: Contacts, fn: Array, ft: Array, row: int, *, friction: Array, reach: int = 4
+    grains: Grains, contacts: Contacts, fn: Array, ft: Array, row: int, *, friction: Array, reach: int = REACH
 ) -> Removal:  # fmt: skip
     """Remove one contact and redistribute its force.
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..bodies.grains import Array, Grains
 from ..contacts.contacts import Contacts
-from .nearest_forces import nearest_forces, neighbourhood, resultants
+from .nearest_forces import REACH, nearest_forces, neighbourhood, resultants
 
 WITHIN = 1e-3  # of the mean normal force: a friction force that is so little beyond the cone is within it
 
@@ -48,7 +48,6 @@ def rebalance(
     *,
     friction: Array,
     moved: Contacts | None = None,
-    reach: int = 4,
 ) -> Array:
     """Return the nearest balanced forces (2, c), f_n and f_t, around some contacts.
 
@@ -64,10 +63,8 @@ def rebalance(
         The coefficient of every contact.
     moved
         The same contacts with other normals; None: as they are.
-    reach
-        Number of contacts from the changed ones within which forces change.
     """
-    touching, members = neighbourhood(grains, contacts, rows, reach)
+    touching, members = neighbourhood(grains, contacts, rows, REACH)
     free = np.flatnonzero(touching)
     given = force[:, free].ravel()
     carried = resultants(grains, contacts, free, members) @ given

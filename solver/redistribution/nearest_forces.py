@@ -18,6 +18,7 @@ from ..convex.interior_point import solve_program
 from ..convex.interior_point_kernels import Program
 
 EQUILIBRIUM_WEIGHT = 1e6  # ρ in units of the mean force: residuals of resultants stay below 1e-4 where forces exist
+REACH = 4  # contacts from a changed one within which forces change
 TOLERANCE = 1e-8  # of the interior-point method
 
 

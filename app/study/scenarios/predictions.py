@@ -58,9 +58,6 @@ TRUE_CAUSE: dict[ScenarioName, tuple[str, ...]] = {
 COMPARED_SCENARIOS: tuple[ScenarioName, ...] = tuple(
     name for name in SCENARIOS if name not in ("corners", "short_walls", "camera", "radius_offset", "ten_frames")
 )
-HEADINGS = (
-    "scenario", "seed", "noise/motion", "step °", "gaps %", "expected", "from", "to", "r from 3", "", "diagnosis",
-)  # fmt: skip
 NOT_EXPLAINED = "not_explained"
 HIGH, POOR_RESULT = 0.95, 0.9  # predicted r above which no test may reach less than the second
 

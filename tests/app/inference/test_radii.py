@@ -54,7 +54,7 @@ def test_estimated_radii_enter_the_tracks_and_the_calibration(monkeypatch: pytes
     error = np.random.default_rng(1).normal(0.0, 1e-4, exact.grain_count)
     remaining = np.random.default_rng(2).normal(0.0, 0.2 * REMAINING, exact.grain_count)
     n = exact.grain_count
-    posterior = RadiusPosterior(remaining - error, np.full(n, REMAINING), float(error.std()), False)
+    posterior = RadiusPosterior(remaining - error, np.full(n, REMAINING), float(error.std()))
     monkeypatch.setattr(radii, "estimate_radii", lambda *_: posterior)
     monkeypatch.setattr(radii, "has_radius_errors", lambda *_: True)
     stated = replace(exact, radius=exact.radius + error)
@@ -81,7 +81,7 @@ def test_radii_are_estimated_without_the_errors_that_all_grains_share(monkeypatc
 
     def estimate(packing: Packing, snapshots: list[Snapshot], _: np.random.Generator) -> RadiusPosterior:
         seen.append((packing.grains.radius, snapshots[0].position, snapshots[0].endpoints))
-        return RadiusPosterior(np.zeros(n), np.full(n, REMAINING), REMAINING, False)
+        return RadiusPosterior(np.zeros(n), np.full(n, REMAINING), REMAINING)
 
     monkeypatch.setattr(radii, "calibrate_tracks", lambda *_: (tracks, walls, shared))
     monkeypatch.setattr(radii, "has_radius_errors", lambda *_: True)

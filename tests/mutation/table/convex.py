@@ -103,7 +103,7 @@ MUTANTS = [
             "return replace(given, matrix=matrix, load=load, grains=blocks, friction=friction)",
             "return replace(given, matrix=matrix, load=load, friction=friction)",
         ),
-        ("power_gaps((each.under(model) for each in frames), settings)", "power_gaps(frames, settings)"),
+        ("power_gaps(each.under(model) for each in frames)", "power_gaps(frames)"),
         (
             "model, enclosed = model.with_value(name, value), enclosed and inside",
             "model, enclosed = model.with_value(name, value), True",

@@ -28,7 +28,7 @@ def make_posterior(
         np.zeros((c, 2)), c + 1, 0,
     )  # fmt: skip
     return FramePosterior(
-        contacts, fn, 0.1 * fn, none, none, np.ones(c), np.zeros((c + 1, 2)), np.zeros(c + 1), 0.0, 0.0, 0.0, 0.0,
+        contacts, fn, 0.1 * fn, none, none, np.ones(c), np.zeros((c + 1, 2)), np.zeros(c + 1), 0.0, 0.0, 0.0,
         trust, 0.99, np.ones(c + 1), np.zeros(c + 1),
     )  # fmt: skip
 

@@ -30,7 +30,7 @@ def posterior_of(fn: np.ndarray, key: np.ndarray | None = None) -> FramePosterio
     )  # fmt: skip
     return FramePosterior(
         contacts, fn, 0.1 * fn, 0.2 * fn, 0.1 * fn, np.full(count, 0.5), np.zeros((1, 2)), np.zeros(1), 0.0, 0.0, 0.0,
-        0.0, 0.9, 0.9, np.zeros(1), np.zeros(1),
+        0.9, 0.9, np.zeros(1), np.zeros(1),
     )  # fmt: skip
 
 

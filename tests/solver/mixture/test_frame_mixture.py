@@ -36,7 +36,7 @@ def make_posterior(
     return FramePosterior(
         some_contacts(c), fn, 0.1 * fn, np.full(c, 0.3), np.full(c, 0.1),
         np.ones(c) if bearing_probability is None else bearing_probability,
-        np.zeros((c + 1, 2)), np.zeros(c + 1), 2e-6, 1e-6, 0.0, 0.0, trust, 0.99, np.ones(c + 1), np.zeros(c + 1),
+        np.zeros((c + 1, 2)), np.zeros(c + 1), 2e-6, 0.0, 0.0, trust, 0.99, np.ones(c + 1), np.zeros(c + 1),
     )  # fmt: skip
 
 

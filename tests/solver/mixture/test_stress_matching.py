@@ -70,7 +70,7 @@ def test_factors_change_the_mixture_but_not_the_agreement() -> None:
     fn, factor = rng.exponential(1.0, C), rng.uniform(0.5, 1.5, C)
     posterior = FramePosterior(
         contacts, fn, 0.1 * fn, np.full(C, 0.3), np.full(C, 0.1), np.ones(C), np.zeros((2 * C, 2)), np.zeros(2 * C),
-        2e-6, 1e-6, 0.0, 0.0, 0.9, 0.99, np.ones(2 * C), np.zeros(2 * C),
+        2e-6, 0.0, 0.0, 0.9, 0.99, np.ones(2 * C), np.zeros(2 * C),
     )  # fmt: skip
     motion = ForceField(contacts.key, np.column_stack([factor * fn, 0.0 * fn]), 0.9)
     plain = mix_fields(motion, posterior, given=1.0)

@@ -280,7 +280,6 @@ def test_overlap_per_force_is_found_from_precise_positions() -> None:
     settings = replace(QUICK, compliance_sd=1e-2, gap_law_sd=2e-4)
     found = infer_frame(soft, settings, np.random.default_rng(SEED))
     assert found.overlap == pytest.approx(5e-3 * found.fn.sum() / found.bearing_probability.sum() / 10.0, rel=0.05)
-    assert found.overlap_sd < 0.2 * found.overlap
 
 
 def test_grain_with_unknown_neighbours_need_not_be_in_balance() -> None:

@@ -18,14 +18,12 @@ def test_exact_radii_stay_exact() -> None:
     found = estimate_radii(packing, snapshots, np.random.default_rng(0))
     assert found.prior_sd < 1e-6
     assert not found.correction.any()
-    assert not found.includes_shared
 
 
 def test_a_common_radius_error_is_corrected() -> None:
     packing, snapshots = lattice_sequence(NOISE)
     small = with_radii(packing, packing.grains.radius - 2e-4)
     found = estimate_radii(small, snapshots, np.random.default_rng(0))
-    assert found.includes_shared
     np.testing.assert_allclose(found.correction, 2e-4, rtol=0.05)
 
 
@@ -60,7 +58,7 @@ def test_radius_errors_of_one_per_cent_are_found_from_all_frames() -> None:
 
 
 def posterior(correction: np.ndarray, sd: float, prior: float) -> RadiusPosterior:
-    return RadiusPosterior(correction, np.full(len(correction), sd), prior, False)
+    return RadiusPosterior(correction, np.full(len(correction), sd), prior)
 
 
 def test_an_error_that_all_grains_of_a_size_have_is_shared() -> None:

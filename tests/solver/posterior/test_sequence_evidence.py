@@ -49,7 +49,7 @@ def exact() -> SequenceEvidence:
 
 
 def test_exact_radii_and_centres_have_small_sd(exact: SequenceEvidence) -> None:
-    assert not exact.corrected
+    assert not exact.radius_correction.any()
     assert exact.radius_sd < 1e-6
     assert exact.touching.offset == pytest.approx(0.0, abs=2e-6)
     assert not exact.radius_correction.any()
@@ -68,7 +68,7 @@ def test_pairs_at_the_plate_sum_to_its_load(exact: SequenceEvidence) -> None:
 def test_a_common_gap_corrects_radii_that_are_all_too_small() -> None:
     packing, snapshots = lattice_sequence(1e-5)
     found = gather_position_evidence(with_radii(packing, packing.grains.radius - 2e-4), snapshots)
-    assert found.corrected
+    assert found.radius_correction.any()
     np.testing.assert_allclose(found.radius_correction, 2e-4, rtol=0.05)
     contacts = found.of_frame(0).contacts
     assert abs(np.median(contacts.gap)) < 1e-5
@@ -78,7 +78,7 @@ def test_a_common_gap_corrects_radii_that_are_all_too_small() -> None:
 def test_an_overlap_counts_as_softness_unless_a_shared_error_is_given() -> None:
     packing, snapshots = lattice_sequence(1e-5)
     packing = with_radii(packing, packing.grains.radius + 2e-5)
-    assert not gather_position_evidence(packing, snapshots).corrected
+    assert not gather_position_evidence(packing, snapshots).radius_correction.any()
     corrected = gather_position_evidence(packing, snapshots, shared_error=1e-4)
     np.testing.assert_allclose(corrected.radius_correction, -2e-5, rtol=0.1)
 
@@ -109,14 +109,10 @@ def test_a_missing_grain_has_no_balance_and_no_pairs() -> None:
     assert np.isfinite(given.contacts.gap).all()
 
 
-def test_without_load_or_weight_the_walls_total_sets_the_scale() -> None:
+def test_without_load_or_weight_the_scale_is_unknown() -> None:
     packing, snapshots = lattice_sequence(1e-5)
     free = replace(packing, pressure=np.full(4, np.nan))
-    evidence = gather_position_evidence(free, snapshots)
-    assert not evidence.of_frame(0).known.scale_known
-    scaled = evidence.of_frame(0, wall_normal_total=200.0)
-    assert scaled.known.scale_known
-    np.testing.assert_array_equal(scaled.known.group >= 0, scaled.contacts.with_wall)
+    assert not gather_position_evidence(free, snapshots).of_frame(0).known.scale_known
 
 
 def test_verdicts_of_reviewers_are_applied() -> None:

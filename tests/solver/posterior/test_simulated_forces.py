@@ -18,7 +18,7 @@ from tests.solver.posterior.simulated import NOISE, simulate_shear
 def test_position_only_forces_correlate_with_the_truth(stiffness: float, least: float) -> None:
     world = simulate_shear(0.25, frames=5, normal_stiffness=stiffness)
     evidence = gather_position_evidence(world.packing, world.snapshots)
-    assert not evidence.corrected
+    assert not evidence.radius_correction.any()
     assert evidence.radius_sd < 0.2 * NOISE
     for k in (2, 4):
         found = infer_frame(evidence.of_frame(k), evidence.settings, np.random.default_rng(k))
