@@ -159,7 +159,6 @@ MUTANTS = [
         ("depth[~jumping[j]])", "0.0 * depth[~jumping[j]])"),
         ("greatest[1:] &= size[1:] >= size[:-1]", "pass"),
         ("range(max(row - 2, 0), min(row + 3, frames))", "range(row, row + 1)"),
-        ("side=walls.side, cell", "side=None, cell"),
     ),
     *mutants_of(
         "solver/assessment/penalties.py",

@@ -65,6 +65,7 @@ MUTANTS = [
         OUTLIERS,
         ('self._with_dims("frame grain")', 'self._with_dims("frame grain xy")'),
         ("axis=1)\n            for name, values", "axis=0)\n            for name, values"),
+        ("load, self.side, cell)", "load, None, cell)"),
     ),
     *mutants_of(
         "solver/boundary/section_shape.py",
