@@ -26,10 +26,6 @@ class Key:
     meaning: str
 
     @property
-    def section(self) -> str:
-        return self.name.rpartition(".")[0]
-
-    @property
     def summary(self) -> str:
         """First sentence of the meaning without the full stop, with the unit."""
         first = self.meaning.partition(". ")[0].rstrip(".")

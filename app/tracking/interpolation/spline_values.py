@@ -40,18 +40,6 @@ def interpolate_cubic(coefficients, ix, iy, tx, ty):
     return ay * r0 + by * r1 + cy * r2 + dy * r3
 
 
-@njit(cache=True, nogil=True)
-def sample(coefficients, x, y, out):
-    """Interpolate the cubic spline at points x, y (p,); NaN outside the image."""
-    height, width = coefficients.shape
-    for p in range(len(x)):
-        if not (x[p] >= 1.0 and y[p] >= 1.0 and x[p] < width - 2 and y[p] < height - 2):
-            out[p] = np.nan
-            continue
-        ix, iy = int(x[p]), int(y[p])
-        out[p] = interpolate_cubic(coefficients, ix, iy, np.float32(x[p] - ix), np.float32(y[p] - iy))
-
-
 @njit(cache=True, nogil=True, inline="always")
 def interpolate_quintic(coefficients, ix, iy, tx, ty):
     """Interpolate the quintic spline at (ix + tx, iy + ty), 0 ≤ t < 1.
