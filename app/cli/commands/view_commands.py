@@ -251,8 +251,8 @@ def _serve(files: list[Path], console: Console) -> int:
 
 def _view_folder(folder: Path, *, web: bool, only_list: bool, console: Console) -> int:
     """List the recordings of a folder by their properties and open them together. Exit status 0."""
-    from ...recording.archive.catalogue import find_recordings, read_catalogue, show_recordings
-    from ...recording.viewing.viewer import has_display
+    from ...recording.archive.catalogue import find_recordings, read_catalogue
+    from ...recording.viewing.viewer import has_display, start_viewer
 
     files = find_recordings(folder)
     if not files:
@@ -267,7 +267,7 @@ def _view_folder(folder: Path, *, web: bool, only_list: bool, console: Console) 
         return 0
     if web:
         return _serve(files, console)
-    viewer = show_recordings(files)
+    viewer = start_viewer("--hide-welcome-screen", *files)
     try:
         viewer.wait()
     finally:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +12,6 @@ from rerun.chunk import RrdReader
 
 from ..files.properties import EXPERIMENT, OUTCOME
 from ..parts import is_later_part
-from ..viewing.viewer import viewer_binary, viewer_environment
 
 RECORDING = "recording.rrd"  # of a run, in a folder of its own
 # Side files of another recording, and recordings that are being written.
@@ -64,11 +62,3 @@ def read_properties(file: Path) -> dict[str, Value]:
     except (RuntimeError, ValueError) as error:
         raise OSError(f"{file} cannot be read as a recording: {error}") from error
     return found
-
-
-def show_recordings(files: Sequence[Path]) -> subprocess.Popen[bytes]:
-    """Open the viewer on several recordings at once, and return its process."""
-    return subprocess.Popen(
-        [str(viewer_binary()), "--hide-welcome-screen", *map(str, files)],
-        env=viewer_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip

@@ -35,7 +35,7 @@ from ..packing_layers.forces.network import SweepChoice
 from ..tabs.blueprint import RecordingLayout, make_blueprint
 from ..tabs.layout_property import send_layout
 from ..viewing.recording_server import RecordingServer, read_growing_file
-from ..viewing.viewer import ViewerKind, free_port, has_display, viewer_binary, viewer_environment
+from ..viewing.viewer import ViewerKind, free_port, has_display, start_viewer
 from .recorder import BATCHES, PhotographSource, Recorder
 from .writing import WrittenFile, writing
 
@@ -153,11 +153,7 @@ class LiveRecording:
             if has_display():
                 open_page(self.address)
         elif self._kind is ViewerKind.NATIVE and has_display():
-            self._viewer = subprocess.Popen(
-                [str(viewer_binary()), "--hide-welcome-screen", "-"],
-                env=viewer_environment(), stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                start_new_session=True,
-            )  # fmt: skip
+            self._viewer = start_viewer("--hide-welcome-screen", "-", stdin=subprocess.PIPE, stays=True)
             threading.Thread(target=self._feed, args=(self._viewer,), daemon=True).start()
             self.hint = "Watch it in the viewer's window."
         elif self._kind is ViewerKind.NATIVE:

@@ -22,7 +22,7 @@ from ..look.entities import ROOT_CONTAINER
 from ..parts import parts_of
 from .connections import users_of_listeners
 from .plain_window import TOP_BAR, contents_of, erase_buttons, path_of, without_panels
-from .viewer import free_port, viewer_binary, viewer_environment
+from .viewer import free_port, start_viewer
 
 START_SECONDS = 60.0
 ANSWER_SECONDS = 60.0
@@ -195,18 +195,15 @@ class HeadlessViewer:
             raise NoPictureError(
                 "no Vulkan driver found: pictures without a screen need one (apt-get install mesa-vulkan-drivers)"
             )
-        environment = viewer_environment()
-        environment.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())
+        environment = {"XDG_RUNTIME_DIR": tempfile.gettempdir()}
         software = [file for file in vulkan_drivers() if "lvp_icd" in file]
         if software and not Path("/dev/dri").exists():
-            environment.setdefault("VK_ICD_FILENAMES", software[0])
+            environment["VK_ICD_FILENAMES"] = software[0]
         port = free_port()
-        self._process = subprocess.Popen(
-            [
-                str(viewer_binary()), "--headless", "--hide-welcome-screen", "--bind", "127.0.0.1", "--port", str(port),
-                "--window-size", self._size,
-            ],
-            env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        self._process = start_viewer(
+            "--headless", "--hide-welcome-screen", "--bind", "127.0.0.1", "--port", str(port),
+            "--window-size", self._size,
+            environment={name: value for name, value in environment.items() if name not in os.environ},
         )  # fmt: skip
         self._clear_at = time.monotonic() + NOTICE_SECONDS
         end = time.monotonic() + START_SECONDS

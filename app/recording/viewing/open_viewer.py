@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import shlex
-import subprocess
 from pathlib import Path
 
 from .recording_server import IDLE_LIMIT, start_server_process
-from .viewer import ViewerKind, has_display, view_command, viewer_environment
+from .viewer import ViewerKind, has_display, start_viewer
 
 
 def open_viewer(path: Path | str, kind: ViewerKind | str = ViewerKind.NATIVE, *also: Path | str) -> str | None:
@@ -43,12 +42,5 @@ def open_viewer(path: Path | str, kind: ViewerKind | str = ViewerKind.NATIVE, *a
     if kind is ViewerKind.WEB:
         address = start_server_process([Path(each) for each in (path, *also)], browser=has_display())
         return f"Served at {address} until {IDLE_LIMIT / 3600.0:g} h pass without a request."
-    subprocess.Popen(
-        view_command(path, *also),
-        env=viewer_environment(),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,  # it survives this process and an interrupt of it
-    )
+    start_viewer(path, *also, stays=True)
     return None

@@ -6,8 +6,10 @@ import os
 import socket
 import subprocess
 import sys
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
+from types import MappingProxyType
 
 import rerun_cli
 
@@ -55,9 +57,20 @@ def run_tool(command: str, *arguments: Path | str) -> None:
         raise OSError(f"rerun rrd {command} failed: {' '.join(done.stderr.split())[-300:]}")
 
 
-def view_command(path: Path | str, *also: Path | str) -> list[str]:
-    """Return the command that shows a recording, with its side files, in a window."""
-    return [str(viewer_binary()), *map(str, (path, *also))]
+def start_viewer(
+    *arguments: Path | str,
+    stdin: int = subprocess.DEVNULL,
+    stays: bool = False,
+    environment: Mapping[str, str] = MappingProxyType({}),
+) -> subprocess.Popen[bytes]:
+    """Start the viewer with further variables of its environment.
+
+    `stays`: it survives this process and an interrupt of it.
+    """
+    return subprocess.Popen(
+        [str(viewer_binary()), *map(str, arguments)], env={**viewer_environment(), **environment},
+        start_new_session=stays, stdin=stdin, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
 
 
 def has_display() -> bool:
