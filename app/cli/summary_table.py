@@ -10,6 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ..process.counts import state_count
+from ..results.finding import Finding
 from ..solver.assessment.reasons import split_reasons
 from ..solver.convex.friction_check import LEAST_SLIDING
 from ..solver.even_subset import even_subset
@@ -68,7 +69,7 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
     border = "cut by the picture's border"
     cut = f"{state_count(summary['cut_grains'], 'rod')} {border}" if summary.get("cut_grains") else ""
     tracked = ", ".join(part for part in (lost, suspect, cut) if part) or "every grain has a pose in every frame"
-    worst = _cell(summary["worst_unbalance"], ".3f")
+    worst = _cell(summary["worst_unbalance"], ".2g")
     lines.append(
         f"Greatest force residual of a grain {worst} of the mean force "
         f"(frame {summary['worst_unbalance_frame']}); {tracked}."
@@ -79,11 +80,9 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
             f"Trust (lower bound of the correlation with the true forces): {min(trusted):.2f} to "
             f"{max(trusted):.2f} over settled frames."
         )
-    lines += [
-        "[bold red]Something is wrong:[/] "
-        + escape(f"{each['cause'].replace('_', ' ')}: {each['evidence']}; {each['effect']}. Cure: {each['cure']}.")
-        for each in summary.get("diagnosis", [])
-    ]
+    for each in map(Finding.of_plain, summary.get("diagnosis", [])):
+        kind = "[bold]Corrected by the run:[/] " if each.corrected else "[bold red]Something is wrong:[/] "
+        lines.append(kind + escape(each.sentence()))
     lines += _sd_line(summary) + budget_lines(summary) + penalty_lines(summary)
     lines += [load_line(each) for each in summary.get("loads", [])]
     scale = [each for each in summary.get("scale_sd", []) if each is not None]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +22,11 @@ class Finding:
         name = self.cause.replace("_", " ")
         return f"{name[0].upper()}{name[1:]}: {self.evidence}; {self.effect}. Cure: {self.cure}."
 
-    def as_plain(self) -> dict[str, str]:
+    def as_plain(self) -> dict[str, str | bool]:
         """Return the values of summary.json."""
-        return {name: value for name, value in asdict(self).items() if name != "corrected"}
+        return asdict(self)
+
+    @classmethod
+    def of_plain(cls, values: Mapping[str, Any]) -> Finding:
+        """Return the finding that values of summary.json describe; earlier summaries lack `corrected`."""
+        return cls(**{each.name: values[each.name] for each in fields(cls) if each.name in values})

@@ -177,7 +177,6 @@ def frame_summaries(data: RunData) -> dict[str, Any]:
         "time": before + tracks.time[:count].tolist(),
         "camera": "" if data.results is None or data.results.lens is None else data.results.lens.describe_terms(),
         "fringes": data.results is not None and data.results.fringes is not None,
-        "diagnosis": [] if data.results is None else [each.sentence() for each in data.results.diagnosis],
     }  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ...results.finding import Finding
 from ...run_folder import RESULTS, SUMMARY, TRACKS, UNFINISHED
 from .run_data import first_photograph
 
@@ -27,14 +28,17 @@ def run_overview(folder: Path, outdated: Sequence[str] = ()) -> dict[str, Any] |
     Returns
     -------
     dict or None
-        `faults`: sentences about results that are out of date, failed photographs, and runs without a settled frame.
+        `faults`: sentences about results that are out of date, causes of wrong forces that the diagnosis found, failed
+        photographs, and runs without a settled frame; `corrected`: causes that the run has corrected itself.
     """
     unfinished = (folder / UNFINISHED).is_dir()
     try:
         summary = json.loads((folder / SUMMARY).read_bytes())
     except (OSError, ValueError):
         present = unfinished or (folder / TRACKS).is_file()
-        return {"unfinished": unfinished, "out_of_date": [], "faults": []} if present else None
+        return {"unfinished": unfinished, "out_of_date": [], "faults": [], "corrected": []} if present else None
+    found = _findings(summary.get("diagnosis"))
+    wrong = [each.sentence() for each in found if not each.corrected]
     trust = [each for each in summary.get("trust", []) if isinstance(each, int | float)]
     return {
         "unfinished": unfinished,
@@ -46,8 +50,11 @@ def run_overview(folder: Path, outdated: Sequence[str] = ()) -> dict[str, Any] |
         "force_unit": summary.get("force_unit", "N"),  # of earlier runs
         "finished_at": (folder / SUMMARY).stat().st_mtime,
         "out_of_date": list(outdated),
+        "causes": len(wrong),
+        "corrected": [each.sentence() for each in found if each.corrected],
         "faults": [
             *_outdated(outdated),
+            *wrong,
             *_failures(folder, summary.get("failures")),
             *_unusable(summary.get("status_count")),
         ],
@@ -56,6 +63,14 @@ def run_overview(folder: Path, outdated: Sequence[str] = ()) -> dict[str, Any] |
 
 def _outdated(reasons: Sequence[str]) -> list[str]:
     return [f"Out of date: {'; '.join(reasons)}. Run again."] if reasons else []
+
+
+def _findings(diagnosis: Any) -> list[Finding]:
+    """Read what the diagnosis found from the summary of a run; nothing where an earlier version wrote it."""
+    try:
+        return [Finding.of_plain(each) for each in diagnosis or []]
+    except TypeError:
+        return []
 
 
 def _failures(folder: Path, failures: Any) -> list[str]:

@@ -35,7 +35,7 @@ function experimentTile(app, each) {
     : h("span", { class: "picture empty" }, "∅");
   const run = each.run;
   const status = each.error ? [h("span", { class: "pill bad" }, "cannot be read")]
-    : run?.frames !== undefined && run ? [...(run.out_of_date?.length ? [["out of date", ""]] : []), ...Object.entries(run.status ?? {})].map(([name, count]) => h("span", { class: `pill ${TONE[name] ?? ""}` }, `${count} ${name}`.trim()))
+    : run?.frames !== undefined && run ? [...(run.out_of_date?.length ? [["out of date", ""]] : []), ...(run.causes ? [["something is wrong", ""]] : []), ...Object.entries(run.status ?? {})].map(([name, count]) => h("span", { class: `pill ${TONE[name] ?? ""}` }, `${count} ${name}`.trim()))
     : [h("span", { class: "pill" }, run?.unfinished ? "unfinished run" : "not run yet")];
   return h("button", { class: "tile", onclick: () => app.queue(async () => app.open(await request("project", { at: each.at }))) },
     picture,
@@ -46,7 +46,7 @@ function experimentTile(app, each) {
       h("span", { class: "dots", title: "photographs, scale, walls, rods, material" }, each.steps.map((mark) => sign(mark)))));
 }
 
-const TONE = { settled: "good", settling: "good", rearranging: "doubtful", suspect: "bad", failed: "bad", reset: "", "out of date": "doubtful" };
+const TONE = { settled: "good", settling: "good", rearranging: "doubtful", suspect: "bad", failed: "bad", reset: "", "out of date": "doubtful", "something is wrong": "bad" };
 
 function seriesTile(app, each) {
   return h("button", { class: "tile", onclick: () => app.queue(async () => app.open(await request("begin", { folder: each.folder, suffix: each.suffix, name: each.name, like: at("like")?.value || null })), "Reading photographs …", `begin ${each.folder} ${each.suffix}`) },

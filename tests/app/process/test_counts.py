@@ -39,3 +39,16 @@ def test_a_single_lost_grain_is_not_called_grains():
     text = " ".join(trust_lines(defaultdict(lambda: None, summary)))
     assert "1 grain, 1 frame." in text
     assert "3 poses of 1 grain lost, 1 pose suspect, 1 rod cut by the picture's border" in text
+
+
+def test_a_small_force_residual_keeps_its_digits_and_a_corrected_cause_is_called_so():
+    found = {"cause": "rotation_sign", "evidence": "backwards", "effect": "none", "cure": "change its sign"}
+    summary = {
+        "status_count": {}, "frame_count": 1, "settled_after": None, "grain_count": 1, "resets": [], "suspects": [],
+        "rearrangements": [], "failures": {}, "lost_poses": 0, "worst_unbalance": 3.2e-4, "worst_unbalance_frame": 0,
+        "trust": [], "status": [], "diagnosis": [found, found | {"cause": "lens", "corrected": True}],
+    }  # fmt: skip
+    lines = trust_lines(defaultdict(lambda: None, summary))
+    assert "Greatest force residual of a grain 0.00032 of the mean force" in " ".join(lines)
+    assert "[bold red]Something is wrong:[/] Rotation sign: backwards; none. Cure: change its sign." in lines
+    assert "[bold]Corrected by the run:[/] Lens: backwards; none. Cure: change its sign." in lines

@@ -80,3 +80,15 @@ def test_a_copied_experiment_needs_another_name(made_tracks, tmp_path):
     assert not described["ready"]
     visitor.request("set_photographs", at="copy", name="copy")
     assert "holds the run of" not in str(visitor.request("project", at="copy")["steps"])
+
+
+def test_what_the_diagnosis_found_is_a_fault_unless_the_run_has_corrected_it(solved):
+    *_, run = solved
+    found = {"cause": "rotation_sign", "evidence": "rods roll backwards", "effect": "rolling is taken for sliding",
+             "cure": "change the sign of theta"}  # fmt: skip
+    sentence = "Rotation sign: rods roll backwards; rolling is taken for sliding. Cure: change the sign of theta."
+    assert summarise(run, status_count={"settled": 3}, diagnosis=[found]) == [sentence]  # as earlier versions wrote it
+    assert run_overview(run)["causes"] == 1
+    assert summarise(run, status_count={"settled": 3}, diagnosis=[found | {"corrected": True}]) == []
+    assert (run_overview(run)["causes"], run_overview(run)["corrected"]) == (0, [sentence])
+    assert summarise(run, status_count={"settled": 3}, diagnosis=["of another program"]) == []

@@ -14,6 +14,7 @@ export function standing(project) {
   const words = [`${run.frames} frames solved`];
   if (run.trust !== null) words.push(`T ≥ ${run.trust.toFixed(2)}`);
   if (run.status?.failed) words.push(`${run.status.failed} failed`);
+  if (run.causes) words.push("something is wrong");
   if (run.out_of_date.length) words.push("out of date");
   return words.join(" · ");
 }

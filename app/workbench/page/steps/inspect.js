@@ -1,6 +1,6 @@
 // Step 7: the force network: any contact or rod with its numbers, its history and its pictures; verdicts by keys.
 
-import { request, at, chart, colour, digits, fact, h, notify } from "/page/dom.js";
+import { request, at, chart, colour, digits, fact, h, notify, sign } from "/page/dom.js";
 import { drawLegends } from "/page/layers/colours.js";
 import { COLOURINGS, drawChange, drawNetwork, loadLook, meanRadius as meanRadiusOf, networkLegends } from "/page/layers/network.js";
 import { drawContacts, drawDisplacement, drawRods, drawTrack, drawValues, drawWalls, motionOf, rodLegends } from "/page/layers/rods.js";
@@ -38,7 +38,7 @@ export const inspect = {
     if (!facts) return [h("p", {}, "There are no forces yet: run the experiment first."), h("button", { class: "primary", onclick: () => app.goTo("run") }, "To the run")];
     if (facts.provisional) return h("p", {}, "The run is not finished: step 6 shows the frames that are solved.");
     return [
-      chosen ? null : facts.diagnosis.map((text) => h("p", { class: "diagnosis" }, sign("doubtful"), text)),
+      chosen || !app.project.run?.corrected.length ? null : h("div", { class: "messages", id: "corrected" }, app.project.run.corrected.map((text) => h("p", {}, sign("good"), `Corrected by the run: ${text}`))),
       h("div", { class: "field" }, h("label", { htmlFor: "colour-by" }, "colour by"), h("select", { id: "colour-by", onchange: (event) => { setLayer("forces", { by: event.target.value, map: null, low: null, high: null }); showLayers(app); app.paint(); } }, Object.entries(COLOURINGS).map(([name, how]) => h("option", { value: name, selected: name === layers.forces.by }, how.words)))),
       h("div", { class: "row" }, h("button", { class: recording ? "on" : "", id: "show-recording", onclick: () => toggleRecording(app), title: "V" }, recording ? "Photograph" : "Recording"), recording ? h("button", { id: "panels", onclick: () => recording.toggle(), title: "Entities, selection and time of the viewer" }, "Its panels") : null),
       net && !recording ? h("div", { class: "row" }, h("button", { id: "save-picture", title: "What is shown, as PNG", onclick: () => savePicture(app, caption(app)) }, "Save picture"), h("button", { id: "save-table", title: "The contacts of this photograph, as CSV", onclick: () => saveTable(app, net) }, "Save table"), h("button", { id: "save-figure", title: "The forces of this photograph as a figure for a paper, SVG", disabled: facts.provisional, onclick: () => saveFigure(app) }, "Save figure")) : null,
