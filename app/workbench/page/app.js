@@ -8,6 +8,7 @@ import { paintLayer } from "/page/layers/settings.js";
 import { drawSetup } from "/page/layers/setup.js";
 import { clearPlot, togglePlot } from "/page/time/plot.js";
 import { closeSheet, isSheetOpen, sheetButton, toggleSheet } from "/page/time/sheet.js";
+import { givenTracks, lacksPhotographs } from "/page/parts/given_tracks.js";
 import { runMark, standing } from "/page/parts/run_state.js";
 import { useForcesOf } from "/page/units.js";
 import { photographs } from "/page/steps/photographs.js";
@@ -126,7 +127,7 @@ function hold(project) {
 app.take = (project) => {
   hold(project);
   app.frame = Math.min(app.frame, Math.max(project.frames - 1, 0));
-  app.step.taken?.(app);
+  if (!lacksPhotographs(app)) app.step.taken?.(app);
   app.paint();
 };
 
@@ -154,8 +155,8 @@ app.go = (step) => {
   location.hash = new URLSearchParams({ at: app.project.at, step: step.name }).toString();
   closeSheet(app);
   showLayers(app);
-  step.enter?.(app);
-  app.stage.use(step.tool?.(app));
+  if (!lacksPhotographs(app)) step.enter?.(app);
+  app.stage.use(lacksPhotographs(app) ? null : step.tool?.(app));
   app.paint();
 };
 
@@ -174,6 +175,9 @@ app.home = () => {
 };
 
 app.hint = (text) => { at("hint").textContent = text ?? ""; };
+
+/** Which photograph is shown; they are counted from 0. */
+app.place = () => `${app.project.files.length ? "photograph" : "frame"} ${app.frame} (0 to ${Math.max(app.project.frames - 1, 0)})`;
 
 app.photograph = (frame) => {
   const { project } = app;
@@ -225,21 +229,21 @@ app.paint = () => {
   }
   at("standing").textContent = standing(project);
   const focused = rememberFocus();
-  at("canvas").setAttribute("aria-label", `Photograph ${app.frame} of ${Math.max(project.frames - 1, 0)}, step ${step.title}. K: a cursor for the keyboard`);
+  at("canvas").setAttribute("aria-label", `${app.place()}, step ${step.title}. K: a cursor for the keyboard`);
   at("steps").replaceChildren(...STEPS.map((each, k) => h("button", {
     class: each === step ? "here" : "", "aria-current": each === step ? "step" : null, onclick: () => app.go(each), title: `Key ${(k + 1) % 10}`, id: `step-${each.name}`,
   }, h("span", { class: "number" }, String((k + 1) % 10)), each.title, sign(markOf(each)))));
   const entry = project.steps.find((each) => each.name === step.name) ?? (step.ofRun ? { mark: runMark(app), messages: project.run?.faults ?? [] } : null);
   const top = at("panel").scrollTop;
-  at("panel").replaceChildren(h("h1", {}, step.title), ...(entry?.messages.length ? [h("div", { class: "messages" }, entry.messages.map((text) => h("p", {}, sign(entry.mark), text)))] : []), ...[step.panel(app)].flat(9).filter(Boolean));
+  at("panel").replaceChildren(h("h1", {}, step.title), ...(entry?.messages.length ? [h("div", { class: "messages" }, entry.messages.map((text) => h("p", {}, sign(entry.mark), text)))] : []), ...[lacksPhotographs(app) ? givenTracks(app) : step.panel(app)].flat(9).filter(Boolean));
   showRefused();
   at("panel").scrollTop = top;
   focused();
-  const edited = app.edits(), hint = step.hint?.(app) ?? "";
+  const edited = app.edits(), hint = lacksPhotographs(app) ? "" : step.hint?.(app) ?? "";
   app.hint(edited === null || project.tracked ? hint : [`Photograph ${edited}`, hint].filter(Boolean).join(" · "));
-  app.stage.draw = (c, k) => { if (step.below) drawSetup(app, c, k, step.below); if (step.layered) step.draw?.(app, c, k); else paintLayer(c, "marks", () => step.draw?.(app, c, k)); };
+  app.stage.draw = (c, k) => { if (step.below) drawSetup(app, c, k, step.below); if (step.layered) step.draw?.(app, c, k); else if (!lacksPhotographs(app)) paintLayer(c, "marks", () => step.draw?.(app, c, k)); };
   app.stage.waits = () => Boolean(step.waits?.(app));
-  app.stage.fixed = (c, k) => step.legend?.(app, c, k); // stays where it is when the picture is moved
+  app.stage.fixed = (c, k) => (lacksPhotographs(app) ? null : step.legend?.(app, c, k)); // stays where it is when the picture is moved
   app.stage.dim = step.dim ?? 1;
   const beside = app.step.frames || app.step.timeline ? [app.frame + 1, app.frame - 1].filter((each) => project.files[each]) : [];
   app.stage.show(app.photograph(app.frame), project.width, project.height, beside.map(app.photograph), project.bounds);
@@ -248,7 +252,8 @@ app.paint = () => {
 
 app.timeline = () => {
   const { project } = app, count = project.frames;
-  at("time").classList.toggle("shown", count > 1 && Boolean(app.step.frames));
+  at("time").classList.toggle("shown", count > 1 && Boolean(app.step.frames) && !lacksPhotographs(app));
+  if (lacksPhotographs(app)) return;
   if (app.step.timeline && count > 1) { app.step.timeline(app); return; }
   if (!app.step.frames || count < 2) return;
   const interval = project.photographs.interval;
@@ -258,7 +263,7 @@ app.timeline = () => {
       h("div", { class: "row lead" }, h("button", { class: "quiet", onclick: () => app.show(app.frame - 1), title: "←", "aria-label": "before" }, "◂"), h("button", { class: "quiet", onclick: () => app.show(app.frame + 1), title: "→", "aria-label": "next" }, "▸"), h("span", { class: "frame", id: "frame-name" })),
       slider, h("div", { class: "row tools" }, h("span", { class: "soft", id: "frame-file" }), sheetButton(app, null, null)));
   }
-  at("frame-name").textContent = `photograph ${app.frame} of ${count - 1}`;
+  at("frame-name").textContent = app.place();
   const number = project.series.number, passed = interval ? digits(interval * ((number[app.frame] ?? app.frame) - (number[0] ?? 0)), 4) : "";
   at("frame-file").textContent = [project.files[app.frame], passed && `${passed} s`].filter(Boolean).join(" · ");
 };
@@ -268,7 +273,7 @@ app.show = (frame) => {
   const last = app.project.frames - 1, next = Math.min(Math.max(frame, 0), last);
   if (next === app.frame) return;
   app.frame = next;
-  app.step.moved?.(app);
+  if (!lacksPhotographs(app)) app.step.moved?.(app);
   app.paint();
 };
 
@@ -301,7 +306,7 @@ addEventListener("keydown", (event) => {
   if (event.key === "Escape" && isSheetOpen()) { closeSheet(app); app.stage.canvas.focus(); return; }
   const number = "1234567890".indexOf(event.key);
   if (number >= 0 && number < STEPS.length && !app.step.digits?.includes(event.key)) { app.go(STEPS[number]); return; }
-  if (app.step.key?.(app, event)) { event.preventDefault(); return; }
+  if (!lacksPhotographs(app) && app.step.key?.(app, event)) { event.preventDefault(); return; }
   const keys = { y: () => toggleLayers(app), f: () => app.stage.fit(), F: () => app.stage.fit(), l: () => { app.stage.loupe = !app.stage.loupe; app.stage.redraw(); }, "+": () => app.stage.zoom(1.3), "=": () => app.stage.zoom(1.3), "-": () => app.stage.zoom(1 / 1.3), ArrowLeft: () => app.show(app.frame - 1), ArrowRight: () => app.show(app.frame + 1), p: () => togglePlot(app), a: () => toggleSheet(app) };
   if (app.edits() !== null || !at("time").classList.contains("shown")) { delete keys.p; delete keys.a; } // there is no time line
   if (keys[event.key] && event.target.type !== "range") { event.preventDefault(); keys[event.key](); }

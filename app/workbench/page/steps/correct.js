@@ -8,7 +8,7 @@ let poses = null, chosen = null, ghost = null, held = null, fit = null, patch = 
 const log = { open: false, poses: null };
 
 export const correct = {
-  name: "correct", title: "Correct", frames: true,
+  name: "correct", title: "Correct", ofPhotographs: true, frames: true,
   mark: (app) => (app.project.run?.lost ? "doubtful" : app.project.run?.frames !== undefined ? "good" : "missing"),
   hint: (app) => (!poses ? "" : app.frame === poses.first ? "All photographs are compared with the first one: correct its rods in step 4" : chosen === null ? "Click a rod; yellow ones are uncertain or lost" : "Drag the rod, rotate it by its handle; it is correlated from there. Enter keeps it"),
   keyHelp: [["Enter", "keep the fitted pose"], ["Shift+Enter", "keep it, and correct the next photographs as well"], ["X", "mark the rod as not visible"], ["Q E", "rotate it by 1°"], ["Shift+arrows", "move it by a pixel"], ["N", "the next uncertain rod, also in later photographs"], ["Esc", "deselect"]],

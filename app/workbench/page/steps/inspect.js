@@ -82,7 +82,7 @@ export const inspect = {
 /** What a picture shows: experiment, photograph, time, status, trust. */
 function caption(app) {
   const { interval } = app.project.photographs, k = app.frame;
-  return [app.project.name, `photograph ${k} of ${app.project.frames - 1}`, interval ? `${digits(k * interval, 4)} s` : "", facts.status[k], `trust ${digits(facts.trust[k], 2)}`, COLOURINGS[layers.forces.by].words].filter(Boolean).join(" · ");
+  return [app.project.name, app.place(), interval ? `${digits(k * interval, 4)} s` : "", facts.status[k], `trust ${digits(facts.trust[k], 2)}`, COLOURINGS[layers.forces.by].words].filter(Boolean).join(" · ");
 }
 
 function closeRecording() { recording?.close(); recording = null; }

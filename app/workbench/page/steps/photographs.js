@@ -11,7 +11,8 @@ const EDITED = "#f0e442";
 let soon = 0, cutting = null, masking = null, brush = null, brushSize = 0, measured = null; // quality: { at, facts, faults, frame, light, contrast }, or { at, failed }; null while it is measured
 
 export const photographs = {
-  name: "photographs", title: "Photographs", frames: true,
+  name: "photographs", title: "Photographs", frames: true, ofPhotographs: true,
+  withTracks: (app) => [nameField(app), keepSection(app)],
   hint: () => (brush ? `Drag over what is to be ignored; brush of ${digits(2 * brush.radius, 3)} px, Shift+wheel or [ ] changes it; Esc ends` : cutting ? "Drag over the region to use" : masking ? `Click the corners of the part to be ignored (${masking.length}); Enter closes it, Esc ends` : ""),
   keyHelp: [["M", "mask a part: click its corners, Enter closes it"], ["B", "mask by a brush: drag; [ ] or Shift+wheel changes its size, Esc ends"], ["Alt+← Alt+→", "this photograph earlier, later in the order"], ["Del", "leave this photograph out"]],
   key(app, event) {
@@ -33,7 +34,7 @@ export const photographs = {
     return [
       fact("photographs", String(project.files.length)),
       fact("size", project.width ? `${project.width} × ${project.height} px` : "–"),
-      h("div", { class: "field" }, h("label", { htmlFor: "field-name" }, "name"), h("input", { id: "field-name", value: project.name, onchange: (event) => app.change("set_photographs", { name: event.target.value }) })),
+      nameField(app),
       section.times ? null : numberField("interval", section.interval, "s", (text) => app.queue(async () => {
         app.change("set_photographs", { interval: parse(text, "interval") });
       })),
@@ -50,13 +51,18 @@ export const photographs = {
         [0, 90, 180, 270].map((angle) => h("option", { value: angle, selected: angle === (section.rotation ?? 0) }, `${angle}°`)))),
       project.files.length ? [h("h2", {}, "Quality"), quality(app)] : null,
       orderSection(app),
-      h("div", { class: "row" }, h("button", { id: "duplicate", title: "A new experiment beside this one, or below the folder that was opened, with the same settings, tables and photographs, without its run", onclick: () => app.queue(async () => { app.open(await request("duplicate", { at: project.at }), "photographs"); notify(`Duplicated: ${app.project.name}`); }, "Duplicating …", "duplicate") }, "Duplicate the experiment"),
-        h("button", { id: "save-script", disabled: !project.undo, title: "Everything that was done here, verdicts included, as a Python script that does it again", onclick: () => saveScript(app) }, "Save the actions as a script")),
+      keepSection(app),
     ];
   },
   layers: ["photograph", "mask", "walls", "rods", "marks"], below: ["mask", "rods", "walls"],
   draw: drawEdited,
 };
+
+const nameField = (app) => h("div", { class: "field" }, h("label", { htmlFor: "field-name" }, "name"), h("input", { id: "field-name", value: app.project.name, onchange: (event) => app.change("set_photographs", { name: event.target.value }) }));
+
+/** A copy of the experiment, and its actions as a script. */
+const keepSection = (app) => h("div", { class: "row" }, h("button", { id: "duplicate", title: "A new experiment beside this one, or below the folder that was opened, with the same settings, tables and photographs, without its run", onclick: () => app.queue(async () => { app.open(await request("duplicate", { at: app.project.at }), "photographs"); notify(`Duplicated: ${app.project.name}`); }, "Duplicating …", "duplicate") }, "Duplicate the experiment"),
+  h("button", { id: "save-script", disabled: !app.project.undo, title: "Everything that was done here, verdicts included, as a Python script that does it again", onclick: () => saveScript(app) }, "Save the actions as a script"));
 
 /** The corners of a new mask, a stroke of the brush and the brush, a new region. */
 function drawEdited(app, c, k) {

@@ -7,7 +7,7 @@ export const CLASS_COLOURS = ["#d8c641", "#1c7afa", "#9bffb4", "#e581b0", "#b4a5
 let chosen = null, held = null, quality = null, typedRadii = null, proposed = null;
 
 export const rods = {
-  name: "rods", title: "Rods", edits: 0,
+  name: "rods", title: "Rods", ofPhotographs: true, edits: 0,
   layers: ["photograph", "mask", "walls", "marks"], below: ["mask", "walls"],
   hint: (app) => (app.project.rods ? "Click chooses a rod or adds one; drag moves, Shift+wheel resizes, Delete removes it" : ""),
   keyHelp: [["Delete", "delete the chosen rod"], ["[ ]", "make it smaller, larger"], ["Shift+arrows", "move it by a quarter pixel"], ["N", "the next doubtful rod"]],

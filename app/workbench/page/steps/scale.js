@@ -8,7 +8,7 @@ const ALIKE = 0.02; // greatest relative difference of the scales of two rods
 let mode = "distance", line = null, metres = null, rods = [], drawn = null, held = null;
 
 export const scale = {
-  name: "scale", title: "Scale", edits: 0,
+  name: "scale", title: "Scale", ofPhotographs: true, edits: 0,
   layers: ["photograph", "mask", "walls", "rods", "marks"], below: ["mask", "rods", "walls"],
   hint: () => (mode === "distance" ? "Drag from one end of a known length to the other; drag an end to correct it" : mode === "rods" ? "Drag from the middle of a rod to its rim; it snaps to the outline" : ""),
   enter(app) {

@@ -13,7 +13,7 @@ const draw = (kind) => { letGo(); drawing.circle = kind === "circle"; drawing.co
 const TURNED = 0.2; // [rad] by which two bars meet no more
 
 export const walls = {
-  name: "walls", title: "Walls", edits: 0,
+  name: "walls", title: "Walls", ofPhotographs: true, edits: 0,
   layers: ["photograph", "mask", "rods", "marks"], below: ["mask", "rods"],
   hint: (app) => (app.project.pixel ? drawing.corner ? "Click a disc in a corner of the frame: its rim is found" : drawing.circle ? `Click three points on the rim, far apart (${points.length} of 3); drag its centre or rim to correct it` : "Drag along the inner edge of a bar, or an end to correct it" : "Set the scale first"),
   keyHelp: [["Delete", "delete the chosen wall"], ["S", "snap to the edge, or not"], ["C", "draw circles, corner discs, or bars"]],

@@ -27,7 +27,7 @@ function showTime(first, strip, tools, below = []) {
 }
 
 function lead(app, count, words) {
-  return h("div", { class: "row lead" }, arrows(app), h("div", { class: "frame" }, h("div", {}, `photograph ${app.frame} of ${count - 1}`), h("div", { class: "soft", style: { fontSize: "12.5px" } }, words)));
+  return h("div", { class: "row lead" }, arrows(app), h("div", { class: "frame" }, h("div", {}, app.place()), h("div", { class: "soft", style: { fontSize: "12.5px" } }, words)));
 }
 
 /** Lost and uncertain rods of every tracked photograph, and the corrections. */
@@ -96,7 +96,7 @@ const arrows = (app) => [["◂", -1, "←"], ["▸", 1, "→"]].map(([words, by,
 
 /** An empty strip of frames; a press goes to a frame, as the arrow keys do. */
 function lane(app, count, title) {
-  const canvas = h("canvas", { id: "lanes", title, tabIndex: 0, role: "slider", "aria-label": title, "aria-valuemin": "0", "aria-valuemax": String(count - 1), "aria-valuenow": String(app.frame), "aria-valuetext": `photograph ${app.frame} of ${count - 1}` });
+  const canvas = h("canvas", { id: "lanes", title, tabIndex: 0, role: "slider", "aria-label": title, "aria-valuemin": "0", "aria-valuemax": String(count - 1), "aria-valuenow": String(app.frame), "aria-valuetext": app.place() });
   dragFrames(app, canvas, count);
   return canvas;
 }
