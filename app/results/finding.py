@@ -22,6 +22,10 @@ class Finding:
         name = self.cause.replace("_", " ")
         return f"{name[0].upper()}{name[1:]}: {self.evidence}; {self.effect}. Cure: {self.cure}."
 
+    def statement(self) -> str:
+        """State the sentence, and that the run has corrected this cause where it has."""
+        return f"Corrected by the run: {self.sentence()}" if self.corrected else self.sentence()
+
     def as_plain(self) -> dict[str, str | bool]:
         """Return the values of summary.json."""
         return asdict(self)

@@ -18,7 +18,7 @@ SMALLEST = 1e-16  # smaller residuals are drawn here: rounding level
 def log_residual_styles(stream: rr.RecordingStream) -> None:
     """Log names and colours of the residual curves."""
     log_curve_style(stream, entities.SWEEP_NATURAL_MAP, "natural map", SERIES[0], 1.5)
-    log_curve_style(stream, entities.SWEEP_UNBALANCE, "worst unbalance / mean f_n", SERIES[1], 1.5)
+    log_curve_style(stream, entities.SWEEP_UNBALANCE, "worst force residual / mean f_n", SERIES[1], 1.5)
     log_curve_style(stream, entities.SWEEP_FORCE_CHANGE, "greatest |Δf|/|f| of a contact", SERIES[3], 1.0)
 
 

@@ -114,8 +114,9 @@ class ResidualPlot:
         notes = [
             (0.24, 0.98, "natural map", COLOURS[0]),
             (0.24, 0.91, "of a cold start", (*COLD[:3], 255)),
-            (0.68, 0.98, "worst unbalance / mean f_n", COLOURS[1]),
+            (0.68, 0.98, "worst force residual / mean f_n", COLOURS[1]),
             (0.68, 0.91, "change per sweep / mean f_n", COLOURS[2]),
+            (0.5, 0.06, "across: sweep", INK),
         ]  # fmt: skip
         if level:
             notes.append((0.46, 0.84, "straight: stopping level", INK))

@@ -135,7 +135,7 @@ def write_recording(
     scene = Scene(
         results.name, tracks, results.walls, results.grains, results.friction, results.configuration, canvas,
         ForceStyle.on(canvas, survey.force_range), truth, options.tolerance, results.radius_tuning,
-        tuple(each.sentence() for each in results.diagnosis), camera,
+        tuple(each.statement() for each in results.diagnosis), camera,
         results.kinematics_of if results.kinematics_of(slice(1)) else None, results.fringes,
     )  # fmt: skip
     run = _Run(results, survey, scene, photograph, options.active, progress, part_frames)

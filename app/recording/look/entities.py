@@ -121,6 +121,7 @@ LOCAL_SHEAR, D2MIN, LOCAL_ROTATION = "shear_strain", "d2min", "rotation"  # maps
 KINEMATIC_MAPS = "/kinematics/map"
 KINEMATIC_LEGENDS = "/legend/kinematics"
 FLUCTUATIONS = "/kinematics/fluctuation"
+FLUCTUATION_LEGEND = "/legend/kinematics/fluctuation"
 PARTICIPATION = "/kinematics/participation"
 SOLID_FRACTION = "/kinematics/solid_fraction"
 

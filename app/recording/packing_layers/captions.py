@@ -54,20 +54,24 @@ def write_card(scene: Scene, forces: FrameForces, statistics: FrameStatistics, t
     values = [
         f"φ {angle:.1f}°" + (f" ± {angle_sd:.1f}°" if _known(angle_sd) else ""),
         f"z {statistics.coordination_number:.2f}",
-        state_count(statistics.contact_count, "contact"),
+        f"{statistics.contact_count} of {state_count(forces.contacts.count, 'contact')} bear force",
         f"mean f_n {statistics.mean_fn:.3g} {scene.force_unit}",
         f"scale of all forces ± {100.0 * forces.scale_sd:.0f} %" if _known(forces.scale_sd) else "",
     ]
-    reasons = [] if forces.status is FrameStatus.SETTLED else [each.strip() for each in forces.reason.split(";")]
     lost = scene.tracks.id[scene.tracks.frame(forces.frame).lost[0]].tolist()
     lines = [head + expected + ".", ", ".join(each for each in values if each) + "."]
     if lost:
         lines.append(
             f"Lost: {state_count(len(lost), 'rod')}: {', '.join(map(str, lost[:12]))}{' …' if len(lost) > 12 else ''}."
         )
-    listed = list(dict.fromkeys(each for each in [*reasons, *split_reasons(forces.trust_penalties)] if each))
-    if listed:
-        lines.append("What lowers the trust:\n\n" + "\n".join(f"- {each}" for each in listed))
+    penalties = list(split_reasons(forces.trust_penalties))
+    reasons = [each.strip() for each in forces.reason.split(";")]
+    for title, listed in (
+        ("What lowers the trust:", penalties),
+        (f"Why {forces.status.name.lower()}, and how the forces were found:", reasons),
+    ):
+        if known := [each for each in dict.fromkeys(listed) if each]:
+            lines.append(f"{title}\n\n" + "\n".join(f"- {each}" for each in known))
     return "\n\n".join(lines)
 
 

@@ -19,9 +19,9 @@ from .forces.force_uncertainty import gap_strokes
 from .residual_maps import DECADES, residual_colours
 
 # Lines that explain gaps: place over the length of the wedge, σ / f_n, text.
-GAP_KEY = ((0.0, 0.0, "f_n ± < 20 %"), (0.28, 0.4, "± 40 %"), (0.54, WIDEST, "± 80 % or more"))
+GAP_KEY = ((0.0, 0.0, "σ / f_n < 20 %"), (0.28, 0.4, "40 %"), (0.54, WIDEST, "80 % or more"))
 KEY_BELOW = 0.47
-_POWERS = ("grains 10⁻⁴", "0.001", "0.01", "0.1", "1")  # labels of the decades of the unbalance map
+_POWERS = ("grains 10⁻⁴", "0.001", "0.01", "0.1", "1")  # labels of the decades of the map of force residuals
 _CHANGES = ("lines 10⁻⁶", "10⁻⁵", "10⁻⁴", "0.001", "0.01")  # labels of the decades of the change map
 
 

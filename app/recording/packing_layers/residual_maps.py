@@ -1,4 +1,4 @@
-"""Writes maps of the residuals of a frame: the unbalance of every grain and the change of every contact.
+"""Writes maps of the residuals of a frame: the force residual of every grain and the change of every contact.
 
 Both are computed from the recorded forces on the contacts of the frame and divided by the mean f_n of the reported
 field. The change is that of one sweep, averaged since the recorded sweep before; the last row of a frame, the reported
@@ -43,7 +43,7 @@ def log_residual_maps(
     scene : Scene
         The run.
     forces : FrameForces
-        The frame; all its contacts count in the unbalance.
+        The frame; all its contacts count in the residuals.
     drawn : FrameForces
         The frame with the contacts whose change is drawn.
     choice : SweepChoice

@@ -146,7 +146,7 @@ def _forces(layout: RecordingLayout, name: str = Tab.FORCES) -> rrb.Container:
     angles = [entities.FRICTION_ANGLE, entities.WALL_RATIO_ANGLE]
     curves = rrb.Horizontal(
         curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], _UNIT_RANGE, corner=_LOW),
-        curve_view("Friction angle [°]", angles, layout.extremes, height=240.0),
+        curve_view("Friction angle [°]; thin: 95 %", angles, layout.extremes, height=240.0),
     )
     walls = wall_force_views(layout.extremes, layout.wall_count, recorded=layout.wall_forces)
     rows: list[rrb.View | rrb.Container] = [
@@ -203,7 +203,7 @@ def _convergence(layout: RecordingLayout) -> rrb.Container:
                    axis=near_axis()),
         curve_view("log₁₀ residuals: starts and reported field", starts, _RESIDUALS),
         curve_view("Settling: ε, ū and H", indicators, layout.extremes, height=230.0),
-        curve_view("Sweeps saved by the former forces", [entities.SAVED_SWEEPS]),
+        curve_view("Sweeps saved by a warm start", [entities.SAVED_SWEEPS]),
     ]  # fmt: skip
     if layout.budget:
         plots[3] = curve_view("Fractions of the error's variance", [entities.ERROR_BUDGET], _UNIT_RANGE,
@@ -217,7 +217,7 @@ def _convergence(layout: RecordingLayout) -> rrb.Container:
                 drawn_view("Its sweeps side by side", "/film/sweeps", *film_bounds(layout.canvas, SWEEP_COLUMNS)),
                 name="Sweeps",
             ),
-            packing_view("Unbalance and change per sweep", layout.canvas, maps),
+            packing_view("Force residuals and change per sweep", layout.canvas, maps),
             drawn_view("Residuals of this frame over its sweeps", "/solve/plot", *PLOT_BOUNDS),
             column_shares=[1.0, 1.0, 1.1],
         ),
@@ -298,11 +298,12 @@ def _statistics(layout: RecordingLayout) -> rrb.Container:
 
 def _kinematics(layout: RecordingLayout) -> rrb.Container:
     """Return maps of the motion beyond the mean field."""
-    views = [packing_view("Fluctuations about the mean field", layout.canvas, [*_PACKING, entities.FLUCTUATIONS])]
+    fluctuations = [*_PACKING, entities.FLUCTUATIONS, entities.FLUCTUATION_LEGEND]
+    views = [packing_view("Fluctuations about the mean field", layout.canvas, fluctuations)]
     for quantity, name in (
         (entities.LOCAL_SHEAR, "Local shear strain"),
-        (entities.D2MIN, "Departure from the local field, √D²min"),
-        (entities.LOCAL_ROTATION, "Rotation minus that of the local field"),
+        (entities.D2MIN, "√D²min about the local field"),
+        (entities.LOCAL_ROTATION, "Rotation − local field"),
     ):
         drawn = f"{entities.KINEMATIC_MAPS}/{quantity}"
         legend = f"{entities.KINEMATIC_LEGENDS}/{quantity}/**"

@@ -131,20 +131,21 @@ def _trust(frames: list[FrameSummary]) -> str:
     status = Counter(f.status for f in frames)
     settled = next((f.frame for f in frames if f.status is FrameStatus.SETTLED), None)
     quantities = (
-        ("trust T (median, least)", [f.trust for f in frames], np.nanmin),
-        ("similarity with the frame before (median, least)", [f.similarity for f in frames], np.nanmin),
-        ("worst grain unbalance over mean f_n (median, greatest)", [f.unbalance for f in frames], np.nanmax),
-        ("natural-map residual reached (median, greatest)", [f.natural_map for f in frames], np.nanmax),
+        ("trust T", [f.trust for f in frames], np.nanmin),
+        ("similarity with the frame before", [f.similarity for f in frames], np.nanmin),
+        ("greatest force residual / mean f_n", [f.unbalance for f in frames], np.nanmax),
+        ("residual of the natural map", [f.natural_map for f in frames], np.nanmax),
     )
     rows = [
         ("settled from", "never" if settled is None else f"frame {settled}"),
         ("status", ", ".join(f"{status[s]} {s.name.lower()}" for s in FrameStatus if status[s])),
-        *((name, _median_and_worst_cells(values, worst).replace(" | ", ", ")) for name, values, worst in quantities),
-        ("grains lost, most in a frame", str(max(f.lost for f in frames))),
+        ("most rods lost in a frame", str(max(f.lost for f in frames))),
     ]
     return (
-        "## How far to trust it\n\n| | |\n|---|---|\n"
-        + "\n".join(f"| {name} | {value} |" for name, value in rows)
+        "## How far to trust it\n\n"
+        + "\n".join(f"- {name}: {value}" for name, value in rows)
+        + "\n\n| of the frames | median | worst |\n|---|---|---|\n"
+        + "\n".join(f"| {name} | {_median_and_worst_cells(values, worst)} |" for name, values, worst in quantities)
         + "\n\nT is a lower bound of the correlation with the true forces, by the evidence of the frame and by what "
         "was found wrong: errors of the input that leave no trace are not included. It holds in every status, which "
         "names what happened to the packing."
@@ -202,7 +203,7 @@ def _frames(frames: list[FrameSummary]) -> str:
         f"| {f.natural_map:.1e} | {f.unbalance:.1e} | {f.contacts} | {np.degrees(f.friction_angle):.1f} | {f.lost} |"
         for f in frames
     ]
-    head = "| frame | status | T | similarity | sweeps | natural map | unbalance | contacts | φ [°] | lost |"
+    head = "| frame | status | T | similarity | sweeps | natural map | residual | bearing contacts | φ [°] | lost |"
     return "\n".join(["## Frames", "", head, "|" + "---|" * 10, *rows]) if rows else ""
 
 
@@ -230,10 +231,10 @@ def _legend(scene: Scene, clipped: int, total: int) -> str:
         "reported field: the estimator *ensemble* computes it from several chains and convex programmes, so that the "
         "forces may jump there. Timelines **time** and **microstrain**: the same frames by the time at which they were "
         "taken, and by the accumulated strain of the packing, in millionths.\n"
-        "- **Unbalance and change**: grains are coloured by their residual force, contacts by their change per sweep, "
-        "averaged since the recorded sweep before (in the last row of a frame: at the end of the sweeps), both over "
-        "the mean f_n.\n"
-        "- **Warm and cold start**: the residual after one sweep from the former forces, and after one from zero "
+        "- **Force residuals and change**: grains are coloured by their force residual, contacts by their change per "
+        "sweep, averaged since the recorded sweep before (in the last row of a frame: at the end of the sweeps), both "
+        "over the mean f_n.\n"
+        "- **Warm and cold start**: the residual after one sweep from the previous forces, and after one from zero "
         "forces, on the problem of the last sub-step of the frame. The sweeps saved are those that zero forces need to "
         "reach the same residual.\n"
         f"- **Film**: forces above {STRONG:g} times the mean of some frames, and above {STRONG_SWEEPS:g} times the "

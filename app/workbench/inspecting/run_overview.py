@@ -51,7 +51,7 @@ def run_overview(folder: Path, outdated: Sequence[str] = ()) -> dict[str, Any] |
         "finished_at": (folder / SUMMARY).stat().st_mtime,
         "out_of_date": list(outdated),
         "causes": len(wrong),
-        "corrected": [each.sentence() for each in found if each.corrected],
+        "corrected": [each.statement() for each in found if each.corrected],
         "faults": [
             *_outdated(outdated),
             *wrong,

@@ -90,5 +90,5 @@ def test_what_the_diagnosis_found_is_a_fault_unless_the_run_has_corrected_it(sol
     assert summarise(run, status_count={"settled": 3}, diagnosis=[found]) == [sentence]  # as earlier versions wrote it
     assert run_overview(run)["causes"] == 1
     assert summarise(run, status_count={"settled": 3}, diagnosis=[found | {"corrected": True}]) == []
-    assert (run_overview(run)["causes"], run_overview(run)["corrected"]) == (0, [sentence])
+    assert (run_overview(run)["causes"], run_overview(run)["corrected"]) == (0, [f"Corrected by the run: {sentence}"])
     assert summarise(run, status_count={"settled": 3}, diagnosis=["of another program"]) == []

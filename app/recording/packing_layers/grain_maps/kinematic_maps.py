@@ -12,6 +12,7 @@ from ....solver.kinematics.sequence_kinematics import SequenceKinematics
 from ...look import entities
 from ...look.clock import Clock
 from ...look.colours import SERIES, packed_one
+from ...look.ramp_legend import log_legend_texts
 from ...look.scene import Scene
 from ...look.values import log_curve_style, log_scalar
 from ..grains_and_walls import last_seen
@@ -45,9 +46,13 @@ class KinematicMaps:
         size = np.sum(found.fluctuation**2, axis=2)
         rms = float(np.sqrt(np.nanmean(size))) if np.isfinite(size).any() else 0.0
         self._stretch = ARROW * float(scene.tracks.radius.mean()) / rms if rms > 0.0 else 0.0
+        self._rms, self._band = rms, bool(found.in_band.any())
 
     def log_styles(self, stream: rr.RecordingStream) -> None:
         """Log legends and the names of the curves."""
+        texts = [(0.5, f"arrows × {self._stretch:.3g}, rms {MICRO * self._rms:.3g} µm")] if self._stretch else []
+        notes = [(0.5, "in a shear band", SERIES[0])] if self._band else []
+        log_legend_texts(stream, self._scene.canvas, entities.FLUCTUATION_LEGEND, texts, notes)
         for each in self._maps:
             each.log_legend(stream, self._scene)
         for path, name, colour in (

@@ -12,6 +12,7 @@ from rodsight.recording.look.canvas import Canvas
 from rodsight.recording.look.force_style import ForceStyle
 from rodsight.recording.look.written_schema import SCHEMA, Condition
 from rodsight.recording.packing_layers.grains_and_walls import grain_colours
+from rodsight.solver.frame_forces import FrameStatus
 from rodsight.tracks import TrackStatus
 
 from tests.app.recording.fake_results import make_results
@@ -129,6 +130,12 @@ def test_the_caption_states_when_how_strained_and_how_far_to_trust_and_sweeps_ar
     assert "not yet the reported field" in forming
     card = latest(path, entities.FRAME_CARD, entities.FRAME, 1)["TextDocument:text"][0]
     assert "trust **0.80**" in card
+    frame = replace(frames[1], status=FrameStatus.SETTLED, reason="history agrees", trust_penalties="noise of 12 µm")
+    path = write_recording(replace(results, frames=[frames[0], frame]), tmp_path / "settled.rrd").path
+    card = latest(path, entities.FRAME_CARD, entities.FRAME, 1)["TextDocument:text"][0]
+    assert f"{results.statistics[1].contact_count} of {frame.contacts.count} contacts bear force" in card
+    assert card.endswith("What lowers the trust:\n\n- noise of 12 µm\n\n"
+                         "Why settled, and how the forces were found:\n\n- history agrees")  # fmt: skip
 
 
 def test_a_lost_grain_is_crossed_out_flagged_and_keeps_its_row(recording, results):

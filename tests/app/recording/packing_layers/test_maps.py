@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.packing_layers.forces.contact_colours import COLOURINGS
+from rodsight.recording.packing_layers.grain_maps.kinematic_maps import ARROW, MICRO
 from rodsight.recording.packing_layers.residual_maps import changes_per_sweep, residual_colours
 from rodsight.solver.contacts.contacts import Contacts
 from rodsight.solver.statistics.balance import grain_unbalance, resultant_norms
@@ -15,6 +17,7 @@ from tests.app.recording.fake_results import make_results
 from tests.app.recording.rows import latest, rows
 
 ROUNDING = 1e-12
+DIGITS = 0.01  # relative error of two numbers of three digits
 
 
 def test_the_unbalance_of_every_sweep_is_that_of_its_forces():
@@ -97,3 +100,11 @@ def test_every_wall_has_one_curve_with_its_name(recording, results):
     ]
     assert list(results.walls.name) in names
     assert np.allclose(shown["Scalars:scalars"], results.statistics[1].wall_normal_force)
+
+
+def test_the_arrows_of_the_fluctuations_state_their_enlargement(recording, results):
+    text = rows(recording.path, entities.FLUCTUATION_LEGEND)[-1]["Points2D:labels"][0]
+    found = re.fullmatch(r"arrows × ([\d.e+]+), rms ([\d.e+]+) µm", text)
+    assert found, text
+    enlarged, rms = map(float, found.groups())
+    assert enlarged * rms == pytest.approx(ARROW * MICRO * results.tracks.radius.mean(), rel=DIGITS)

@@ -54,6 +54,19 @@ def test_the_summary_lists_so_many_reasons_only(tmp_path):
     assert [line.split(",")[0] for line in listed] == [f"- frame {k}" for k in range(MAX_REASONS)]
 
 
+def test_the_summary_shows_median_and_worst_frame_beside_their_names(tmp_path):
+    frames = [
+        replace(each, trust=trust, unbalance=residual)
+        for each, trust, residual in zip(
+            make_results(3, sweeps=2).frames, (0.9, 0.7, 0.8), (1e-5, 2e-5, 0.3), strict=True
+        )
+    ]
+    text = summary_of(frames, tmp_path / "run.rrd")
+    assert "| of the frames | median | worst |" in text
+    assert "| trust T | 0.8 | 0.7 |" in text
+    assert "| greatest force residual / mean f_n | 2e-05 | 0.3 |" in text
+
+
 def test_a_summary_without_reasons_has_no_list(tmp_path):
     assert "Reasons that lower T" not in summary_of(make_results(2, sweeps=2).frames, tmp_path / "run.rrd")
 
