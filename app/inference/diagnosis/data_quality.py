@@ -38,6 +38,7 @@ FEW_SLIDING = 0.1
 COARSE_STEPS = 2.0  # of REFERENCE_STEP, beyond which closer photographs are advised
 AMBIGUOUS = (0.05, 0.95)  # P(touch) between which a pair is ambiguous
 TOUCHING = 0.5  # P(touch)
+MOSTLY_CENTRES = 0.3  # of the noise, below which the motion adds less than a twentieth to it
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +55,7 @@ class DataQuality:
     gap_offset: float  # [m] mean gap of touching grains by their radii
     gap_sd: float  # [m] standard deviation of these gaps: noise, errors of radii and centres, overlap
     diameter: float  # [m] mean
+    tracked_noise: float = math.nan  # [m] of the motion alone, by correlation; NaN: the tracks are given
 
     @property
     def noise_ratio(self) -> float:
@@ -68,12 +70,11 @@ class DataQuality:
     def describe(self) -> list[str]:
         """Describe noise, motion, sliding and gaps in one to four sentences."""
         step = math.degrees(self.shear)
-        stated = ", as given" if self.noise == self.stated_noise else f" (stated: {1e6 * self.stated_noise:.3g} µm)"
         lines = [
-            f"First {self.photographs} photographs: positions have a noise of {1e6 * self.noise:.3g} µm{stated}, and "
-            f"neighbours move by {1e6 * self.motion:.3g} µm in a step of {step:.2g}° of shear; "
-            f"{_percent(self.sliding)} of the contacts slide by more than noise; {_percent(self.ambiguous)} of the "
-            "candidate pairs are ambiguous: touching or not."
+            f"First {self.photographs} photographs: positions have a noise of {1e6 * self.noise:.3g} µm"
+            f"{self._describe_origin()}, and neighbours move by {1e6 * self.motion:.3g} µm in a step of {step:.2g}° of "
+            f"shear; {_percent(self.sliding)} of the contacts slide by more than noise; {_percent(self.ambiguous)} of "
+            "the candidate pairs are ambiguous: touching or not."
         ]
         if self.sliding <= FEW_SLIDING:
             lines.append("Too few slide to test the friction of rods and walls: it is used as given.")
@@ -86,6 +87,19 @@ class DataQuality:
         if self.shear > COARSE_STEPS * REFERENCE_STEP:
             lines.append(f"In steps of {math.degrees(REFERENCE_STEP):.2g}° forces could be followed between frames.")
         return lines
+
+    def _describe_origin(self) -> str:
+        """State where the noise comes from: the tables, or the errors of centres and of the motion in photographs."""
+        other, stated = self.noise != self.stated_noise, f"{1e6 * self.stated_noise:.3g} µm"
+        if math.isnan(self.tracked_noise):
+            return f" (stated: {stated})" if other else ", as given"
+        expected = f" (expected: {stated})" if other else ""
+        return (
+            f"{expected}, nearly all of which is one error of each centre in all photographs: motions have "
+            f"{1e6 * self.tracked_noise:.2g} µm"
+            if self.tracked_noise < MOSTLY_CENTRES * self.noise
+            else f"{expected}, by the correlation"
+        )
 
     @property
     def obstacle(self) -> str:
@@ -138,6 +152,7 @@ def measure_data_quality(tracks: Tracks, walls: WallTracks | None) -> DataQualit
         gap_offset,
         gap_sd,
         2.0 * float(first.radius.mean()),
+        math.nan if first.centre_sigma is None else float(np.nanmedian(first.sigma)),
     )  # fmt: skip
 
 

@@ -36,6 +36,16 @@ def test_unknown_sliding_coarse_steps_and_a_wrong_stated_noise_are_reported():
     assert "steps of 0.25°" in replace(GOOD, shear=4 * REFERENCE_STEP).describe()[1]
 
 
+def test_noise_that_tracking_estimates_is_not_called_given():
+    tracked = replace(GOOD, noise=2.7e-5, stated_noise=2.7e-5, tracked_noise=8.6e-7)
+    assert (
+        "a noise of 27 µm, nearly all of which is one error of each centre in all photographs: motions have 0.86 µm, "
+        "and neighbours move by 120 µm"
+    ) in tracked.describe()[0]
+    assert "a noise of 27 µm, by the correlation, and" in replace(tracked, tracked_noise=2e-5).describe()[0]
+    assert "a noise of 50 µm (expected: 27 µm), by" in replace(tracked, noise=5e-5, tracked_noise=2e-5).describe()[0]
+
+
 def test_a_common_error_of_radii_is_reported():
     apart = replace(GOOD, gap_offset=0.1 * 0.016)
     assert "mean gap of 1.6e+03 µm, 10 % of a diameter: all radii are 800 µm too small" in apart.describe()[1]

@@ -25,7 +25,7 @@ export const run = {
           ? [h("button", { id: "pause", disabled: state === "pausing", onclick: () => act(app, "run_pause") }, state === "pausing" ? "Pausing …" : "Pause"), h("button", { disabled: state === "pausing", onclick: () => act(app, "run_cancel") }, "Cancel")]
           : [h("button", { class: "primary", id: "run", disabled: !project.ready, onclick: () => act(app, "run_start") }, state === "paused" || project.run?.unfinished ? "Go on" : project.run?.frames !== undefined ? "Run again" : "Run"),
             h("button", { id: "follow", disabled: !project.ready, title: "Wait for further photographs in the folder, and solve them as they come", onclick: () => act(app, "run_start", { follow: true }) }, "Follow a running test")]),
-      busy ? null : h("div", { class: "row" }, h("button", { id: "prediction", disabled: !project.ready, title: "Three photographs are tracked; noise, motion and contacts predict the accuracy of the forces", onclick: () => predict(app) }, "Predict the accuracy")),
+      busy ? null : h("div", { class: "row" }, h("button", { id: "prediction", disabled: !project.ready, title: "The first twelve photographs are tracked and solved: their evidence predicts the accuracy of the forces", onclick: () => predict(app) }, "Predict the accuracy")),
       predicted?.at === project.at ? h("div", { class: "messages", id: "predicted" }, predicted.messages.map((text) => h("p", {}, sign(predicted.mark), text))) : null,
       job && state !== "idle" ? h("div", { class: "card" },
         h("div", { class: "fact" }, h("span", {}, "the run"), h("span", { id: "run-state" }, state)),
