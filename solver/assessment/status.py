@@ -84,9 +84,10 @@ def _decide(evidence: Evidence) -> tuple[FrameStatus, str]:
     if evidence.force_change > NEW_FORCES:
         return FrameStatus.SETTLING, _describe_change(evidence)
     if evidence.frames_since_event < SETTLING_FRAMES:
+        count = evidence.frames_since_event
         return (
             FrameStatus.SETTLING,
-            f"{evidence.frames_since_event} of {SETTLING_FRAMES} frames since the last event",
+            f"the last event was {count} {'frame' if count == 1 else 'frames'} ago: settling takes {SETTLING_FRAMES}",
         )
     if math.isnan(evidence.correction):
         return FrameStatus.SETTLING, "the correction of the measured motion is not known"
@@ -126,12 +127,12 @@ def find_faults(evidence: Evidence) -> list[str]:
     unbalanced = CHAIN_UNBALANCED if math.isnan(evidence.disagreement) else UNBALANCED
     if not evidence.unbalance <= unbalanced:  # NaN is no balance
         faults.append(
-            f"pathological: the worst grain is out of balance by {evidence.unbalance:.2g} mean forces "
+            f"the worst grain is out of balance by {evidence.unbalance:.2g} mean forces "
             f"(> {unbalanced}): a contact of it may be missing, or it accelerates"
         )
     if not math.isnan(evidence.load_fraction) and not LOAD_FRACTIONS[0] <= evidence.load_fraction <= LOAD_FRACTIONS[1]:
         faults.append(
-            f"pathological: the mean stress is {evidence.load_fraction:.2f} of the load, which allows "
+            f"the mean stress is {evidence.load_fraction:.2f} of the load, which allows "
             f"{LOAD_FRACTIONS[0]} to {LOAD_FRACTIONS[1]}: force chains are missing or jammed"
         )
     if motion_assessment(evidence).trust >= RELIABLE and evidence.unbalance < IN_BALANCE:

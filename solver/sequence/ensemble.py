@@ -215,7 +215,9 @@ def _describe_missing(contacts: Contacts, fn: Array, missing: MissingContacts) -
     if not added.any():
         return []
     bearing = int((fn[added] > BEARING_FRACTION * fn[fn > 0].mean()).sum()) if (fn > 0).any() else 0
-    return [f"the balance shows {added.sum()} pairs that were not detected, of which {bearing} bear force"]
+    count = int(added.sum())
+    pairs = "1 contact that was" if count == 1 else f"{count} contacts that were"
+    return [f"equilibrium needs {pairs} not detected, of which {bearing} {'bears' if bearing == 1 else 'bear'} force"]
 
 
 @dataclass(frozen=True, slots=True)

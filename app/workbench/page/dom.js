@@ -63,6 +63,16 @@ export function digits(value, count = 3) {
   return String(Number(value.toPrecision(count)));
 }
 
+const RECEIVED = 4; // significant digits of the values of a run that the server sends
+/** A value with its standard deviation: two digits of it, and as many decimals of the value as it has, as 2.00 ± 0.10. */
+export function withDeviation(value, deviation, unit = "", count = 3) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  if (deviation === null || deviation === undefined || !(deviation > 0)) return `${digits(value, count)} ${unit}`.trim();
+  const places = Math.min(Math.max(1 - Math.floor(Math.log10(Number(deviation.toPrecision(2)))), 0), 12);
+  const sent = Math.max(RECEIVED - 1 - Math.floor(Math.log10(Math.abs(value) || 1)), 0);
+  return `${value.toFixed(Math.min(places, sent))} ± ${Number(deviation.toPrecision(2)).toFixed(places)} ${unit}`.trim();
+}
+
 export function parse(text, what) {
   const value = Number(text.replace(",", "."));
   if (text === "" || !Number.isFinite(value)) throw new Error(`${what}: ${text || "nothing"} is not a number`);

@@ -32,14 +32,28 @@ export function rangeOfValues(values, { zero = false, signed = false } = {}) {
   return [zero ? 0 : at(0.02), at(0.98) || 1];
 }
 
+/** Signs that differ in shape as well as colour, with their names, in the place of a ramp. */
+function drawSigns(c, k, x, y, words, signs) {
+  c.font = `${12 / k}px system-ui, "Noto Sans", "DejaVu Sans", sans-serif`; c.textAlign = "left";
+  c.fillStyle = "#e9ebf0"; c.fillText(words, x, y - 7 / k, WIDE / k);
+  signs.forEach(({ words: name, colour, shape }, n) => {
+    const [u, v] = [x + (5 + n * WIDE / signs.length) / k, y + 12 / k], path = new Path2D();
+    if (shape === "bar") { path.moveTo(u, v - 5 / k); path.lineTo(u, v + 5 / k); } else path.arc(u, v, 3.6 / k, 0, 7);
+    c.fillStyle = c.strokeStyle = colour; c.lineWidth = (shape === "bar" ? 3 : 1.6) / k;
+    if (shape === "disc") c.fill(path); else c.stroke(path);
+    c.fillStyle = "#e9ebf0"; c.fillText(name, u + 7 / k, v + 4 / k, (WIDE / signs.length - 14) / k);
+  });
+}
+
 const WIDE = 170, TALL = 9, ROW = 58; // [px]
 
 /** Legends of the scales, one above the other in the lower left corner. */
 export function drawLegends(app, c, k, scales) {
   const { stage } = app, by = stage.enlarged;
-  scales.forEach(({ words, unit = "", below = "", scale }, n) => {
+  scales.forEach(({ words, unit = "", below = "", scale, signs = null }, n) => {
     const wide = WIDE / k, tall = TALL / k, [x, y] = stage.toPhotograph(16 * by, stage.boxHeight - (36 + ROW * n) * by);
     c.fillStyle = "#0c0e12e0"; c.beginPath(); c.roundRect(x - 6 / k, y - 22 / k, wide + 12 / k, 53 / k, 8 / k); c.fill();
+    if (signs) { drawSigns(c, k, x, y, words, signs); return; }
     for (let m = 0; m < 34; m += 1) { c.fillStyle = shadeOf(scale.ramp, m / 33); c.fillRect(x + m * wide / 34, y, wide / 34 + 0.5 / k, tall); }
     c.fillStyle = "#e9ebf0"; c.font = `${12 / k}px system-ui, "Noto Sans", "DejaVu Sans", sans-serif`;
     c.textAlign = "left"; c.fillText(words, x, y - 7 / k, wide); c.fillText(`${below}${digits(scale.low, 3)}`, x, y + 24 / k);

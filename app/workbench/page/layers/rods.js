@@ -114,6 +114,7 @@ export function rodLegends(net, motions) {
   const found = [], strain = motions[layers.strain.since], moved = motions[layers.displacement.since];
   if (layers.strain.on && strain) { const how = chosenValues(strain); found.push({ words: `${how.words}${how.needs ? "" : over(strain)}`, unit: how.unit, scale: scaleOfValues(strain) }); }
   if (layers.displacement.on && moved) { const scale = scaleOfDisplacement(net, moved); found.push({ words: `${layers.displacement.by === "all" ? "displacement" : "fluctuation"}${over(moved)}, drawn × ${digits(scale.times, 2)}`, unit: "µm", scale }); }
+  if (layers.contacts.on && layers.contacts.by === "state") found.push({ words: "contacts", signs: [["sticking", "disc"], ["sliding", "bar"], ["open", "ring"]].map(([state, shape]) => ({ words: state, colour: STATES[state], shape })) });
   if (layers.contacts.on && layers.contacts.by !== "state") { const how = CONTACTS[layers.contacts.by]; found.push({ words: `contacts: ${how.words}`, unit: how.unit, scale: scaleOfContacts(net) }); }
   return found;
 }

@@ -1,6 +1,6 @@
 // Step 7: the force network: any contact or rod with its numbers, its history and its pictures; verdicts by keys.
 
-import { request, at, chart, colour, digits, fact, h, notify, sign } from "/page/dom.js";
+import { request, at, chart, colour, digits, fact, h, notify, sign, withDeviation } from "/page/dom.js";
 import { drawLegends } from "/page/layers/colours.js";
 import { COLOURINGS, drawChange, drawNetwork, loadLook, meanRadius as meanRadiusOf, networkLegends } from "/page/layers/network.js";
 import { drawContacts, drawDisplacement, drawRods, drawTrack, drawValues, drawWalls, motionOf, rodLegends } from "/page/layers/rods.js";
@@ -42,7 +42,7 @@ export const inspect = {
       h("div", { class: "field" }, h("label", { htmlFor: "colour-by" }, "colour by"), h("select", { id: "colour-by", onchange: (event) => { setLayer("forces", { by: event.target.value, map: null, low: null, high: null }); showLayers(app); app.paint(); } }, Object.entries(COLOURINGS).map(([name, how]) => h("option", { value: name, selected: name === layers.forces.by }, how.words)))),
       h("div", { class: "row" }, h("button", { class: recording ? "on" : "", id: "show-recording", onclick: () => toggleRecording(app), title: "V" }, recording ? "Photograph" : "Recording"), recording ? h("button", { id: "panels", onclick: () => recording.toggle(), title: "Entities, selection and time of the viewer" }, "Its panels") : null),
       net && !recording ? h("div", { class: "row" }, h("button", { id: "save-picture", title: "What is shown, as PNG", onclick: () => savePicture(app, caption(app)) }, "Save picture"), h("button", { id: "save-table", title: "The contacts of this photograph, as CSV", onclick: () => saveTable(app, net) }, "Save table"), h("button", { id: "save-figure", title: "The forces of this photograph as a figure for a paper, SVG", disabled: facts.provisional, onclick: () => saveFigure(app) }, "Save figure")) : null,
-      chosen?.j !== undefined ? pairCard(app) : chosen ? rodCard(app) : h("p", {}, facts.reason[app.frame] ?? ""),
+      chosen?.j !== undefined ? pairCard(app) : chosen ? rodCard(app) : reasonsOf(app),
       chosen ? null : [list ? h("button", { id: "to-review", onclick: () => app.goTo("review") }, "Review contacts") : null, givenSection(app, (each) => show(app, each))],
       chosen || !facts.camera ? null : h("p", { id: "camera", class: "hint" }, `Camera and radii: ${facts.camera}.`),
     ];
@@ -173,9 +173,14 @@ function judge(app, verdict) {
 
 function show(app, each) { chosen = null; wanted = each; if (each.frame === app.frame) app.queue(() => load(app, true)); else app.show(each.frame); }
 
+/** Why the frame has its status, one reason a line. */
+function reasonsOf(app) {
+  const reasons = (facts.reason[app.frame] ?? "").split("; ").filter(Boolean);
+  return reasons.length ? h("div", { id: "reasons" }, h("h2", {}, `Why ${facts.status[app.frame]}, and how`), h("ul", { class: "reasons" }, reasons.map((text) => h("li", {}, text)))) : null;
+}
+
 function pairCard(app) {
   const seen = past, k = app.frame, judging = [reviewerField(() => app.queue(() => load(app, true)))], row = net ? net.i.findIndex((i, n) => i === chosen.i && net.j[n] === chosen.j) : -1;
-  const with_ = (value, sd, unit, count = 3) => (value === null || value === undefined ? "–" : `${digits(value, count)}${sd !== null && sd !== undefined ? ` ± ${digits(sd, 2)}` : ""} ${unit}`);
   return h("div", { class: "card here", id: "card" },
     h("div", { class: "fact" }, h("b", {}, pairName(chosen)), chosen.verdict ? h("span", { class: "pill" }, h("i", { class: "swatch", style: { background: COLOURS[chosen.verdict], display: "inline-block" } }), ` ${chosen.verdict}`) : null),
     app.project.files.length ? (past ? strip(app) : h("div", { class: "strip" })) : null,
@@ -183,10 +188,10 @@ function pairCard(app) {
     judging,
     beforeAfter(k, chosen),
     [
-      row >= 0 ? [fact("f_n", with_(net.fn[row], net.fn_sd[row], shown("N"))), fact("f_t", with_(net.ft[row], net.ft_sd[row], shown("N"))), fact("state", /reviewer/.test(net.source[row]) ? net.source[row] : `${net.state[row]}, ${net.age[row]} frames old`)] : fact("force", "none: no contact"),
-      past ? fact("gap", with_(past.gap[k] === null ? null : past.gap[k] * 1e6, past.gap_sd[k] * 1e6, "µm")) : null,
+      row >= 0 ? [fact("f_n", withDeviation(net.fn[row], net.fn_sd[row], shown("N"))), fact("f_t", withDeviation(net.ft[row], net.ft_sd[row], shown("N"))), fact("state", /reviewer/.test(net.source[row]) ? net.source[row] : `${net.state[row]}, ${net.age[row]} frames old`)] : fact("force", "none: no contact"),
+      past ? fact("gap", withDeviation(past.gap[k] === null ? null : past.gap[k] * 1e6, past.gap_sd[k] * 1e6, "µm")) : null,
       fact("P(touch)", digits(chosen.probability, 3)),
-      past ? [h("span", { class: "soft" }, "normal force over the frames"), chart(58, "normal force over the frames", (c, w, hh) => spark(app, c, w, hh, seen.fn, seen.fn_sd, true)), h("span", { class: "soft" }, "gap over the frames [µm]"), chart(58, "gap over the frames", (c, w, hh) => spark(app, c, w, hh, seen.gap.map((v) => (v === null ? null : v * 1e6)), seen.gap_sd.map((v) => v * 1e6), false))] : null,
+      past ? [h("span", { class: "soft" }, `normal force over the frames [${shown("N")}]; bars: one standard deviation`), chart(58, "normal force over the frames", (c, w, hh) => spark(app, c, w, hh, seen.fn, seen.fn_sd, true)), h("span", { class: "soft" }, "gap over the frames [µm]"), chart(58, "gap over the frames", (c, w, hh) => spark(app, c, w, hh, seen.gap.map((v) => (v === null ? null : v * 1e6)), seen.gap_sd.map((v) => v * 1e6), false))] : null,
     ],
     row < 0 ? null : without ? [
       h("p", {}, without.balanced ? `Without it, the nearest forces in equilibrium change by ${digits(without.total_change, 3)} times the mean force in total (orange: more, blue: less).` : `Without it the rods around it are not in equilibrium: a residual of ${digits(without.residual, 2)} of the mean force is left. The contact is needed.`),
@@ -210,8 +215,8 @@ function rodCard(app) {
     h("div", { class: "fact" }, h("b", {}, bodyName(chosen.id)), h("span", { class: "pill" }, n < 0 ? "lost" : net.rods.status[n])),
     rodPast ? [
       fact("radius", measured("length", rodPast.radius)), fact("rotation", rodPast.rotation[k] === null ? "unknown" : `${digits(rodPast.rotation[k] * 180 / Math.PI, 3)}°`),
-      rodPast.centre_sigma === null ? null : fact("centre sd, the same in all", `± ${digits(rodPast.centre_sigma * 1e6, 2)} µm`),
-      fact("motion sd", rodPast.sigma[k] === null ? "–" : `± ${digits(rodPast.sigma[k] * 1e6, 2)} µm`), fact("force residual / mean f_n", digits(rodPast.unbalance[k], 2)),
+      rodPast.centre_sigma === null ? null : fact("error of the centre, constant", `± ${digits(rodPast.centre_sigma * 1e6, 2)} µm`),
+      fact("error of the motion", rodPast.sigma[k] === null ? "–" : `± ${digits(rodPast.sigma[k] * 1e6, 2)} µm`), fact("force residual / mean f_n", digits(rodPast.unbalance[k], 2)),
       h("span", { class: "soft" }, "correlation over the frames"), chart(58, "correlation over the frames", (c, w, hh) => spark(app, c, w, hh, seen.zncc, null, false)),
     ] : null,
     h("span", { class: "soft" }, "contacts"),

@@ -62,11 +62,11 @@ function card(app, wall, k) {
       h("button", { class: "quiet", title: "Delete this wall", onclick: () => app.change("delete_wall", { name: wall.name }) }, "✕")),
     wall.corner ? h("p", { class: "soft" }, "A disc in a corner of the frame: it moves with its bar, and shares its load.") : numberField(`pressure ${wall.name}`, wall.pressure === null ? "" : within("pressure", wall.pressure, 6), unit("pressure"), (text) => app.queue(async () => {
       plate({ pressure: text === "" ? null : typed("pressure", text, "pressure") });
-    }), { placeholder: "moves as seen" }),
+    }), { placeholder: "measured motion" }),
     wall.corner ? null : wall.circle ? h("div", { class: "field" }, h("label", { htmlFor: `side-${k}` }, "packing is"), h("select", { id: `side-${k}`, onchange: (event) => { const { x, y, radius } = wall.circle, side = event.target.value; if (side === "corner") app.change("make_corner", { name: wall.name }); else app.change("draw_circle", { name: wall.name, place: [x, y, radius], side }); } },
       [["in", "inside the circle"], ["out", "outside it"], ["corner", "outside it, a disc in a corner of the frame"]].map(([value, words]) => h("option", { value, selected: value === (wall.corner ? "corner" : wall.circle.side) }, words))))
-    : h("div", { class: "field" }, h("label", { htmlFor: `ends-${k}`, title: "bar: the ends are points of the bar itself; corners: where bars meet, and the bar slides along; judged: by how their distance changes" }, "its ends are"), h("select", { id: `ends-${k}`, onchange: (event) => plate({ ends: event.target.value }) },
-      [["auto", "judged"], ["bar", "of the bar"], ["corner", "corners"]].map(([value, words]) => h("option", { value, selected: value === wall.ends }, words)))));
+    : h("div", { class: "field" }, h("label", { htmlFor: `ends-${k}`, title: "points of the bar: they move with it; corners: where bars meet, and the bar slides along; automatic: corners where their distance changes" }, "its ends are"), h("select", { id: `ends-${k}`, onchange: (event) => plate({ ends: event.target.value }) },
+      [["auto", "found automatically"], ["bar", "points of the bar"], ["corner", "corners"]].map(([value, words]) => h("option", { value, selected: value === wall.ends }, words)))));
 }
 
 function tool(app) {

@@ -10,7 +10,7 @@ import { sheetButton } from "/page/time/sheet.js";
 export function showLanes(app, facts, chosen = null) {
   const count = app.project.frames;
   at("time").classList.add("shown");
-  const canvas = lane(app, count, "status · trust · friction angle");
+  const canvas = lane(app, count, "colours: status; bars: trust; line: friction angle; dots: lost rods", (k) => wordsOf(facts, k));
   const status = facts?.status[app.frame];
   const words = facts && app.frame >= facts.first && app.frame < facts.count
     ? [h("i", { class: "swatch", style: { background: TONES[status] ?? "#888", display: "inline-block" } }), h("b", {}, ` ${status}`), ` · T ${digits(facts.trust[app.frame], 2)} · φ ${digits(facts.friction_angle[app.frame], 3)}°`]
@@ -33,7 +33,7 @@ function lead(app, count, words) {
 /** Lost and uncertain rods of every tracked photograph, and the corrections. */
 export function showLost(app, poses) {
   const count = app.project.frames, here = poses && app.frame < poses.lost_count.length;
-  const canvas = lane(app, count, "lost · uncertain · corrected");
+  const canvas = lane(app, count, "red: lost rods; yellow: uncertain; green dots: corrected", (k) => (poses && k < poses.lost_count.length ? `${poses.lost_count[k]} lost, ${poses.uncertain_count[k]} uncertain` : ""));
   showTime(lead(app, count, here ? `${poses.lost_count[app.frame]} lost · ${poses.uncertain_count[app.frame]} uncertain` : ""), canvas, h("div", { class: "row tools" }, sheetButton(app, null, null)));
   requestAnimationFrame(() => {
     const { c, step, height } = begin(canvas, count);
@@ -94,9 +94,16 @@ function draw(app, canvas, facts, count) {
 
 const arrows = (app) => [["◂", -1, "←"], ["▸", 1, "→"]].map(([words, by, key]) => h("button", { class: "quiet", onclick: () => app.show(app.frame + by), title: key, "aria-label": by < 0 ? "before" : "next" }, words));
 
-/** An empty strip of frames; a press goes to a frame, as the arrow keys do. */
-function lane(app, count, title) {
+/** The values of a photograph that the strip draws. */
+const wordsOf = (facts, k) => (facts && k >= facts.first && k < facts.count ? [facts.status[k], `T ${digits(facts.trust[k], 2)}`, `φ ${digits(facts.friction_angle[k], 3)}°`, facts.lost[k] ? `${facts.lost[k]} lost` : ""].filter(Boolean).join(", ") : "");
+
+/** An empty strip of frames; a press goes to a frame, as the arrow keys do; values: those of the frame under the mouse. */
+function lane(app, count, title, values) {
   const canvas = h("canvas", { id: "lanes", title, tabIndex: 0, role: "slider", "aria-label": title, "aria-valuemin": "0", "aria-valuemax": String(count - 1), "aria-valuenow": String(app.frame), "aria-valuetext": app.place() });
   dragFrames(app, canvas, count);
+  canvas.addEventListener("pointermove", (event) => {
+    const { left, width } = canvas.getBoundingClientRect(), k = Math.min(Math.max(Math.floor((event.clientX - left) / width * count), 0), count - 1), words = values(k);
+    canvas.title = `${words ? `${k}: ${words}\n` : ""}${title}`;
+  });
   return canvas;
 }

@@ -1,6 +1,6 @@
 // Values over the photographs below the time line: of the chosen contact or rod, of others that are kept, or of the frames.
 
-import { at, colour, digits, h } from "/page/dom.js";
+import { at, colour, digits, h, withDeviation } from "/page/dom.js";
 import { download, fileName } from "/page/parts/take_away.js";
 import { sheetButton } from "/page/time/sheet.js";
 import { begin, dragFrames } from "/page/time/strip.js";
@@ -59,7 +59,7 @@ export function plotRow(app, facts, chosen) {
     h("div", { class: "plot-keys" },
       h("select", { id: "plot-quantity", "aria-label": "what is plotted", onchange: (event) => { plot.quantity[kind] = event.target.value; app.timeline(); } }, Object.entries(QUANTITIES[kind]).map(([name, [text]]) => h("option", { value: name, selected: name === plot.quantity[kind] }, text))),
       items.map((item) => h("div", { class: "fact" }, h("span", {}, sample(item.line), item.name),
-        h("span", {}, valueAt(values(item.data), app.frame, unit), kind === "frame" ? null : h("button", { class: "quiet", "aria-label": `${kept(item.name) ? "drop" : "keep"} ${item.name}`, title: kept(item.name) ? "Take it out of the plot" : "Keep it in the plot, to compare", onclick: () => keep(app, item) }, kept(item.name) ? "✕" : "＋"))))),
+        h("span", {}, valueAt(values(item.data), app.frame, unit), kind === "frame" ? null : h("button", { class: "quiet", "aria-label": `${kept(item.name) ? "drop" : "keep"} ${item.name}`, title: kept(item.name) ? "Take it out of the plot" : "Keep it in the plot, to compare", onclick: () => keep(app, item) }, kept(item.name) ? "✕" : "+"))))),
     canvas,
     h("div", { class: "row tools" }, h("button", { id: "save-plot", title: "What is plotted, as CSV", onclick: () => save(app, facts, chosen) }, "CSV")),
   ];
@@ -82,8 +82,7 @@ function keep(app, item) {
 }
 
 function valueAt([values, sd], frame, unit) {
-  const value = values[frame], deviation = sd?.[frame];
-  return value === null || value === undefined ? "–" : `${digits(value, 3)}${deviation ? ` ± ${digits(deviation, 2)}` : ""} ${unit}`;
+  return withDeviation(values[frame], sd?.[frame], unit);
 }
 
 export function drawPlot(app, facts, chosen) {

@@ -35,7 +35,7 @@ function showSheet(app, focus = false) {
   if (sheet.shown !== key || focus) {
     sheet.shown = key;
     at("sheet").replaceChildren(
-      h("div", { class: "row" }, h("h2", {}, places ? `${sheet.chosen.name} in all photographs` : "All photographs"), h("span", { class: "grow" }),
+      h("div", { class: "row head" }, h("h2", {}, places ? `${sheet.chosen.name} in all photographs` : "All photographs"), h("span", { class: "grow" }),
         sheet.chosen?.data ? h("button", { id: "sheet-around", class: sheet.around ? "on" : "", "aria-pressed": String(sheet.around), onclick: () => { sheet.around = !sheet.around; showSheet(app); } }, `Around ${sheet.chosen.name}`) : null,
         h("button", { class: "quiet", "aria-label": "smaller pictures", onclick: () => resize(app, -1) }, "−"), h("button", { class: "quiet", "aria-label": "larger pictures", onclick: () => resize(app, 1) }, "+"),
         h("button", { id: "close-sheet", title: "Esc", onclick: () => { closeSheet(app); at("canvas").focus(); } }, "Close")),
@@ -55,7 +55,7 @@ function cell(app, k, places, width) {
   const side = Math.min(Math.round(sheet.side * (devicePixelRatio || 1)), 600), source = places
     ? p && `/crop?${new URLSearchParams({ at: app.project.at, frame: k, x: p[0], y: p[1], width, columns: side, rows: side })}`
     : app.project.files.length ? `${app.photograph(k)}&size=${side}` : null;
-  const words = [`photograph ${k}`, status, status && facts.trust[k] !== null ? `T ${digits(facts.trust[k], 2)}` : null, facts?.lost[k] ? `${facts.lost[k]} lost` : null].filter(Boolean);
+  const words = [`photograph ${k}`, status, status && facts.trust[k] !== null ? `T\u00a0${digits(facts.trust[k], 2)}` : null, facts?.lost[k] ? `${facts.lost[k]} lost` : null].filter(Boolean);
   return h("button", { class: "cell", "data-frame": String(k), style: { borderTopColor: status ? TONES[status] : "var(--edge)" }, onclick: () => app.show(k), ondblclick: () => { app.show(k); closeSheet(app); } },
     source ? h("img", { alt: "", loading: "lazy", src: source, style: { aspectRatio: places ? "1" : `${app.project.width} / ${app.project.height}` } }) : h("span", { class: "nothing", style: { aspectRatio: "1" } }, places ? "not seen" : "∅"),
     h("span", {}, words.join(" · ")));
