@@ -82,11 +82,21 @@ def check_packing(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> 
     check_radii(sources, tracks)
     bounded_by_walls = walls.cell is None and tracks.boundary is None
     return [
-        *rods_beyond_ends(tracks, walls),
         *implausible_density(experiment.config.material.density),
-        *implausible_loads(experiment.config.material, tracks, walls),
         *(open_sides(walls, experiment.config.material.gravity) if bounded_by_walls else []),
-        *free_surfaces(experiment, tracks, walls),
+        *implausible_walls(experiment, tracks, walls),
+    ]
+
+
+def implausible_walls(experiment: Experiment, tracks: Tracks, walls: WallTracks, *, enclosed: bool = True) -> list[str]:
+    """Describe rods beyond the ends of walls, loads that cannot be right, and sides where no rod touches a wall.
+
+    enclosed: False: a side without any wall is reported elsewhere, and none is sought.
+    """
+    return [
+        *rods_beyond_ends(tracks, walls),
+        *implausible_loads(experiment.config.material, tracks, walls),
+        *(free_surfaces(experiment, tracks, walls) if enclosed else []),
     ]
 
 

@@ -23,9 +23,8 @@ from ...experiment.plausibility import (
     check_inside,
     check_radii,
     expected_rods,
-    implausible_loads,
+    implausible_walls,
     open_sides,
-    rods_beyond_ends,
     rods_cut_by_walls,
 )
 from ...experiment.reading.input_files import InputFiles
@@ -299,7 +298,8 @@ def _validate_walls(found: ValidationResult, experiment: Experiment) -> None:
         return
     if not walls.loaded.any():
         step.add_warning("No wall has a pressure: forces are known only up to their scale.")
-    for sentence in open_sides(walls.frames(0, 1), config.material.gravity) if config.boundary is None else ():
+    unbounded = open_sides(walls.frames(0, 1), config.material.gravity) if config.boundary is None else []
+    for sentence in unbounded:
         step.add_warning(sentence)
     if found.rods is None:
         return
@@ -317,7 +317,8 @@ def _validate_walls(found: ValidationResult, experiment: Experiment) -> None:
         return
     for name, count in rods_cut_by_walls(tracks, first).items():
         step.add_error(f"Wall {name!r} cuts through {state_count(count, 'rod')}: move it to their rims.")
-    for sentence in (*rods_beyond_ends(tracks, first), *implausible_loads(config.material, tracks, first)):
+    enclosed = config.boundary is None and not unbounded
+    for sentence in implausible_walls(experiment, tracks, first, enclosed=enclosed):
         step.add_warning(sentence)
 
 

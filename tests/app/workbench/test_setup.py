@@ -12,11 +12,14 @@ from rodsight.experiment.reading.tables import read_table
 from rodsight.experiment.scaling import make_scale
 from rodsight.experiment.walls import read_walls
 from rodsight.workbench.service import project
+from rodsight.workbench.service.workbench import Workbench
 from rodsight.workbench.setup.draft import Draft
 
+from tests.app.workbench.conftest import Visitor
 from tests.program import rodsight
 
 RADII = [0.007, 0.008, 0.011]
+BESIDE = 160.0  # [px] from a wall: on the table
 
 
 @pytest.fixture
@@ -335,3 +338,16 @@ def test_the_first_comment_of_an_experiment_stays(tmp_path):
     assert draft.data() == {"name": "b", "photographs": {"files": "*.png"}}
     draft.undo()
     assert draft.data() == {"name": "a"}
+
+
+def test_a_wall_that_no_rod_touches_is_named_before_the_run(spoiled):
+    visitor = Visitor(Workbench(spoiled)).enter()
+    described = visitor.request("project", at="mine")
+    assert marks(described)["walls"] == "good"
+    (right,) = [wall["line"] for wall in described["walls"] if wall["name"] == "right"]
+    described = visitor.request(
+        "draw_wall", at="mine", name="right", line=[[x + BESIDE, y] for x, y in right], snap=False
+    )
+    (step,) = [step for step in described["steps"] if step["name"] == "walls"]
+    assert step["mark"] == "doubtful"
+    assert any(text.startswith("The packing has a free surface at the right") for text in step["messages"])
