@@ -48,6 +48,7 @@ from .walls.texture_or_edge import BarMotion
 Columns = dict[str, NDArray[Any]]
 
 WALLS = "tracked_walls.csv"
+FEWEST_WITHIN = 0.5  # fraction of the circles between the walls below which these are wrong
 
 
 def discard_message(message: str) -> None:
@@ -228,6 +229,8 @@ def _detect(
         detection = add_missing_discs(first, detection)
     centres = np.stack([detection.x, detection.y], axis=1)
     within = _inside_walls(scale.to_world(centres), walls) if walls is not None else None
+    if within is not None and len(within) and within.mean() < FEWEST_WITHIN:
+        within = None  # the walls are wrong, not the circles: the check of the packing names the mistake
     messages = [
         *_channel_messages(experiment, settings, detection),
         *describe_false_detections(detection, within, first.shape),

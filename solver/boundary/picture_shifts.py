@@ -67,7 +67,7 @@ def _gaps_of_walls(rows: GapRows, geometry: GapGeometry) -> tuple[Float[Array, "
     """Mean normal, gap [m] and frame of every wall in every frame with FEWEST rods or more (q)."""
     order = np.lexsort((geometry.gap, rows.j, rows.frame))
     starts = np.flatnonzero(np.diff(rows.frame[order], prepend=-1) | np.diff(rows.j[order], prepend=-1))
-    ends = np.append(starts[1:], len(order))
+    ends = np.append(starts[1:], len(order))[: len(starts)]  # none where no rod is beside a wall
     outermost = [order[a : min(b, a + OUTERMOST)] for a, b in zip(starts, ends, strict=True) if b - a >= FEWEST]
     normal = np.array([geometry.normal[each].mean(axis=0) for each in outermost]).reshape(-1, 2)
     gap = np.array([np.median(geometry.gap[each]) for each in outermost])

@@ -234,6 +234,11 @@ def test_one_misplaced_wall_is_no_displacement_of_the_camera(outward) -> None:
     assert not picture_shifts(replace(sequence, endpoints=endpoints)).any()
 
 
+def test_walls_that_no_rod_is_near_show_no_shift() -> None:
+    sequence, _ = sheared_box()
+    assert not picture_shifts(replace(sequence, position=sequence.position + 100.0 * RADIUS)).any()
+
+
 def test_rods_between_two_circles_show_no_shift_by_the_outermost() -> None:
     rng = np.random.default_rng(3)
     angle = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
