@@ -105,17 +105,31 @@ def find_exchanged_sizes(
     if not exchanged.any():
         return radius
     pairs = pairs.select(pairs.other < len(radius))
-    kept = ~(exchanged[pairs.grain] | exchanged[pairs.other])
-    overlap = (radius[pairs.grain] + radius[pairs.other] - pairs.distance)[kept]
-    usual = float(np.quantile(np.append(overlap[overlap > 0.0], 0.0), USUAL))
+    kept = pairs.select(~(exchanged[pairs.grain] | exchanged[pairs.other]))
+    _, overlap = _mean_overlaps(kept, radius, touch)
+    usual = float(np.quantile(np.append(overlap, 0.0), USUAL))
     if exchanged.mean() > MOST or not usual < HARD * touch:
         return radius
-    own = found[pairs.grain] + found[pairs.other] - pairs.distance
+    of_grain, own = _mean_overlaps(pairs, found, touch)
     for grain in np.flatnonzero(exchanged & (found > radius)).tolist():
-        its = own[(pairs.grain == grain) & (own > 0.0)]
+        its = own[of_grain == grain]
         if len(its) and np.median(its) > max(usual, TIGHT * touch):
             exchanged[grain] = False
     return np.where(exchanged, found, radius)
+
+
+def _mean_overlaps(pairs: _Pairs, radius: Array, touch: float) -> tuple[NDArray[np.int64], Array]:
+    """Grains (p,) and mean overlaps (p,) [m] of pairs that overlap on average over the photographs in which they touch.
+
+    The mean is hardly one of noise, which may be as large as the greatest overlap that shows a size.
+    """
+    overlap = radius[pairs.grain] + radius[pairs.other] - pairs.distance
+    near = overlap > -touch
+    _, first, row = np.unique(
+        pairs.grain[near] * len(radius) + pairs.other[near], return_index=True, return_inverse=True
+    )
+    mean = np.bincount(row, weights=overlap[near]) / np.maximum(np.bincount(row), 1)
+    return pairs.grain[near][first][mean > 0.0], mean[mean > 0.0]
 
 
 def _at_known_walls(pairs: _Pairs, radius: Array, touch: float) -> _Pairs:

@@ -63,6 +63,13 @@ def test_overlaps_of_soft_grains_show_no_size(packing) -> None:
     assert np.array_equal(find_exchanged_sizes(less, radius, right), radius)
 
 
+def test_noise_is_no_overlap(packing) -> None:
+    position, radius, _ = packing
+    stated, classes = exchanged(radius, [22, 31, 40, 44], 1)
+    noisy = position + np.random.default_rng(1).normal(0.0, 5e-5, position.shape)  # the limit is 125 µm
+    assert np.array_equal(find_exchanged_sizes(noisy, stated, classes), radius)
+
+
 def test_nothing_is_exchanged_where_most_would_be(packing) -> None:
     position, radius, _ = packing
     stated, classes = exchanged(radius, list(range(0, len(radius), 2)), 1)
