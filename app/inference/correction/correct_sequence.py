@@ -31,6 +31,7 @@ from .tables.outliers import remove_outliers, restore_exchanged_ids
 from .tables.rotations import correct_rotations
 from .tables.short_gaps import interpolate_short_gaps
 from .tables.wall_times import correct_wall_times
+from .tables.walls_at_rest import correct_walls_at_rest
 from .unseen import add_unseen
 
 # Corrections that the first frame reports, in this order.
@@ -152,6 +153,8 @@ def _correct_tables(inputs: Inputs) -> tuple[Tracks, WallTracks, dict[int, str],
             done["rotations"] = "; ".join(filter(None, (each.describe() for each in wrong)))
         if inputs.settings.boundary is not None:
             walls, done["times"] = correct_wall_times(tracks, walls)
+            walls, resting = correct_walls_at_rest(tracks, walls)
+            done["rest"] = "; ".join(each.evidence for each in resting if each.corrected)
         if inputs.settings.calibration is not None:
             tracks, done["sizes"] = correct_exchanged_sizes(tracks, walls)
     tracks, done["outliers"] = remove_outliers(tracks, walls, inputs.placed)

@@ -96,7 +96,9 @@ CAUSES: dict[str, Cause] = {
         corrected=True,
     ),
     "wall_at_rest": Cause(
-        "rods seem to penetrate the wall or to leave it", "give the motion of the wall in every photograph"
+        "rods seem to penetrate the wall or to leave it",
+        "a run moves it with the rods that touch it: give the motion of the wall in every photograph",
+        corrected=True,
     ),
     "wall_forces": Cause(
         "a load, a sensor or the forces are wrong, and with a load the scale of all forces",

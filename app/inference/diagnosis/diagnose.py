@@ -26,6 +26,7 @@ from ..correction.correct_sequence import complete_walls, correct_sequence
 from ..correction.tables.outliers import restore_exchanged_ids
 from ..correction.tables.rotations import correct_rotations
 from ..correction.tables.wall_times import correct_wall_times
+from ..correction.tables.walls_at_rest import correct_walls_at_rest
 from ..inputs import Inputs
 from .causes import finding, name_once
 from .data_quality import measure_data_quality
@@ -36,7 +37,6 @@ from .direct_tests import (
     examine_poses,
     examine_sizes,
     examine_wall_places,
-    examine_walls,
     find_impossible_poses,
 )
 from .distortion import seeks_distortion, undistorted
@@ -98,13 +98,15 @@ def diagnose(
     turned, rotations = _examine_rotations(inputs, restored, walls)
     names += [each for each in rotations if each.corrected]
     inputs = replace(inputs, tracks=turned)
-    walls, late = correct_wall_times(turned, walls) if inputs.settings.boundary is not None else (walls, "")
-    names += [finding("walls_shifted", late, corrected=True)] if late else []
+    if inputs.settings.boundary is not None:
+        walls, moved = _examine_moving_walls(turned, walls)
+        names += [each for each in moved if each.corrected]
     sought = not undisturbed and seeks_distortion(inputs, walls, failed)
     tracks, walls, camera = undistorted(inputs, walls, failed, camera=sought)
     found = [each for each in rotations if not each.corrected]
     found += [*examine_order(tracks), *examine_smoothing(inputs.tracks)]
-    found += examine_walls(tracks, walls) or _examine_wall_times(tracks, walls) or examine_wall_places(tracks, walls)
+    moving = (replace(each, corrected=False) for each in _examine_moving_walls(tracks, walls)[1])
+    found += list(moving) or examine_wall_places(tracks, walls)
     found += examine_sizes(tracks, walls) or examine_sections(tracks)
     found += examine_inertia(tracks, walls, inputs.material) + examine_load(tracks, walls, inputs.material)
     impossible = np.zeros(tracks.status.shape, np.bool_) if undisturbed else find_impossible_poses(tracks, walls)
@@ -131,10 +133,12 @@ def _examine_rotations(inputs: Inputs, tracks: Tracks, walls: WallTracks) -> tup
     return corrected, [finding(each.cause, each.evidence, corrected=each.corrected) for each in wrong]
 
 
-def _examine_wall_times(tracks: Tracks, walls: WallTracks) -> list[Finding]:
-    """Name walls that are late as a run uses them."""
-    _, late = correct_wall_times(tracks, walls)
-    return [finding("walls_shifted", late, corrected=False)] if late else []
+def _examine_moving_walls(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, list[Finding]]:
+    """Return the walls as a run moves them, and name those that are late or stated at rest."""
+    walls, late = correct_wall_times(tracks, walls)
+    walls, resting = correct_walls_at_rest(tracks, walls)
+    found = [finding("walls_shifted", late, corrected=True)] if late else []
+    return walls, found + [finding("wall_at_rest", each.evidence, corrected=each.corrected) for each in resting]
 
 
 def _compare_rivals(

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from itertools import islice
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,12 +10,12 @@ from ...solver.bodies.grains import Array, Grains
 from ...solver.bodies.outer_grains import find_outer_grains
 from ...solver.bodies.rods import RodMaterial
 from ...solver.bodies.strain import displacement_gradient, inertial_time, shear_strain
-from ...solver.bodies.wall_shapes import STRAIGHT, behind_body, outward_normals
+from ...solver.bodies.wall_shapes import STRAIGHT
 from ...solver.contacts.contacts import detect_contacts
 from ...tracks import Tracks, WallTracks
 from ..correction.radii import NAMED, find_oversized_rods, find_wrong_sizes
 from ..correction.tables.outliers import find_outliers, walls_in
-from ..correction.tables.wall_times import rods_beside
+from ..correction.tables.walls_at_rest import near_gap
 from ..snapshots import grains_of
 from .causes import finding
 
@@ -32,17 +29,14 @@ EVEN = 0.25  # standard deviation of all other steps over their mean up to which
 SAME = 0.1  # displacement over that of noise, below which both are one photograph
 OUTLYING = 0.95  # quantile of the displacements above which a rod may be an outlier …
 OUTLYING_IN_TWO = 0.75  # … where the order is judged: each of two photographs has its own
-DRIFT_SIGMAS = 15.0  # standard deviations of a position by which rods may leave or penetrate a wall …
-DRIFT = 0.02  # … and fraction of the mean radius
-TOGETHER = 0.2  # of the greatest change of a gap at a wall: what a common translation of all rods may leave
 IN_BOTH = 0.1  # fraction of the rods that two photographs must show to be compared
-BEYOND = 0.1  # mean radius by which rods may stand beyond a wall
+BEYOND_SIGMAS = 15.0  # standard deviations of a position by which rods may stand beyond a wall …
+BEYOND = 0.1  # … and mean radii
 USUAL, BEYOND_USUAL = 0.99, 1.5  # quantile of all overlaps, and times it that an outlier overlaps another body
 MISSING = 0.03  # fraction of the poses that may be missing
 MOSTLY_MISSING = 0.5  # fraction of the rods that a photograph shows, below which it is named
 INERTIAL, OUT = 5e-3, 7.0  # inertial number that is reported; force out of balance over the mean force, for I = 1
 SEVERAL = 6  # rods that stand beyond a wall at least: with fewer, their radii may be wrong
-NEAREST = 3  # rods at a wall: the distance of the third nearest is judged
 
 
 def examine_order(tracks: Tracks) -> list[Finding]:
@@ -81,47 +75,6 @@ def _nothing_moves(step: Array, noise: float) -> NDArray[np.bool_]:
     if still.sum() == 1 and others.std() < EVEN * others.mean():
         return still
     return step < SAME * noise
-
-
-def examine_walls(tracks: Tracks, walls: WallTracks) -> list[Finding]:
-    """Look for straight walls that rods leave or penetrate more and more, unless all rods move so against all walls.
-
-    A camera that moves changes the gaps at opposite walls in opposite ways, which a run corrects.
-    """
-    if walls.count == 0 or tracks.frame_count < 3:
-        return []
-    allowed = max(DRIFT_SIGMAS * float(np.nanmedian(tracks.position_sigma)), DRIFT * float(tracks.radius.mean()))
-    gaps = {w: _first_and_last_gap(tracks, walls, w) for w in np.flatnonzero(walls.sides == STRAIGHT).tolist()}
-    changes = {w: last - first for w, (first, last) in gaps.items() if np.isfinite(last - first)}
-    if _moved_together(walls, changes):
-        return []
-    found = []
-    for w, change in changes.items():
-        loaded = np.isfinite(walls.pressure[w]) or (walls.load is not None and np.isfinite(walls.load[:, w]).any())
-        still = float(np.abs(walls.endpoints[:, w] - walls.endpoints[0, w]).max()) < allowed
-        penetrated = max(change, gaps[w][1]) < -allowed  # rods that only come near a wall do not
-        if still and (penetrated or (loaded and change > allowed)):
-            does = "penetrate" if change < 0 else "leave"
-            words = f"rods {does} wall '{walls.name[w]}', which does not move, by {1e3 * abs(change):.2g} mm"
-            found.append(finding("wall_at_rest", words))
-    return found
-
-
-def _first_and_last_gap(tracks: Tracks, walls: WallTracks, w: int) -> tuple[float, float]:
-    """Gaps at wall w [m] in the first photograph and, by their median, in the last three; NaN without rods there."""
-    forward, back = (_known_gaps(tracks, walls, w, order) for order in (1, -1))
-    begin, end = list(islice(forward, 1)), list(islice(back, 3))
-    return (begin[0], float(np.median(end))) if len(end) == 3 else (np.nan, np.nan)
-
-
-def _moved_together(walls: WallTracks, changes: Mapping[int, float]) -> bool:
-    """Whether one translation of all rods explains the changes of the gaps [m] at more walls than it has components."""
-    normal = outward_normals(walls.endpoints[0, list(changes)])
-    change = np.array(list(changes.values()))
-    if len(change) <= np.linalg.matrix_rank(normal, tol=0.1):
-        return False
-    rest = change + normal @ np.linalg.lstsq(normal, -change, rcond=0.1)[0]
-    return bool(np.abs(rest).max() < TOGETHER * np.abs(change).max())
 
 
 def examine_poses(tracks: Tracks, impossible: NDArray[np.bool_]) -> list[Finding]:
@@ -203,10 +156,10 @@ def examine_inertia(tracks: Tracks, walls: WallTracks, material: RodMaterial) ->
 
 def examine_wall_places(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     """Look for straight walls that several rods stand beyond in every photograph."""
-    allowed = max(DRIFT_SIGMAS * float(np.nanmedian(tracks.position_sigma)), BEYOND * float(tracks.radius.mean()))
+    allowed = max(BEYOND_SIGMAS * float(np.nanmedian(tracks.position_sigma)), BEYOND * float(tracks.radius.mean()))
     found = []
     for w in np.flatnonzero(walls.sides == STRAIGHT).tolist():
-        gap = np.array([_near_gap(tracks, walls, k, w, nearest=SEVERAL) for k in range(tracks.frame_count)])
+        gap = np.array([near_gap(tracks, walls, k, w, nearest=SEVERAL) for k in range(tracks.frame_count)])
         gap = gap[np.isfinite(gap)]
         if len(gap) and float(np.median(gap)) < -allowed:
             words = f"rods stand {1e3 * -float(np.median(gap)):.2g} mm beyond wall '{walls.name[w]}'"
@@ -264,20 +217,6 @@ def _shortened_by_sorting(tracks: Tracks, step: Array) -> float:
         left.remove(nearest)
     shorter = 1.0 - path / float(known.sum())
     return shorter if shorter > SORTED else 0.0
-
-
-def _known_gaps(tracks: Tracks, walls: WallTracks, w: int, order: int) -> Iterator[float]:
-    """Gaps [m] of wall w in the photographs that show one, from the first (order 1) or from the last (−1)."""
-    gaps = (_near_gap(tracks, walls, k, w) for k in range(tracks.frame_count)[::order])
-    return (gap for gap in gaps if np.isfinite(gap))
-
-
-def _near_gap(tracks: Tracks, walls: WallTracks, k: int, w: int, *, nearest: int = NEAREST) -> float:
-    """Gap [m] between a wall and one of the nearest rods beside it."""
-    rows, gap = rods_beside(tracks, k, walls.endpoints[k, w])
-    if not np.isnan(walls.endpoints[k]).any():
-        gap = gap[~behind_body(walls.endpoints[k], walls.sides, tracks.position[k, rows])[:, w]]
-    return float(np.sort(gap)[nearest - 1]) if len(gap) >= nearest else np.nan
 
 
 def examine_load(tracks: Tracks, walls: WallTracks, material: RodMaterial) -> list[Finding]:

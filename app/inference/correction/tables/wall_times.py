@@ -118,9 +118,13 @@ def rods_near(tracks: Tracks, k: int, ends: Array) -> tuple[NDArray[np.intp], Ar
 
 def touching(tracks: Tracks, k: int, here: NDArray[np.intp], ends: Array) -> NDArray[np.bool_]:
     """Whether rods (m,) of photograph k touch a wall that has ends (t, 2, 2): (t, m)."""
-    width = max(SIGMAS * float(np.nanmedian(tracks.position_sigma)), ROUGH * float(tracks.radius.mean()))
     gap = distance_from_walls(ends[:, None], None, tracks.position[k, here]) - tracks.radius[here]
-    return np.abs(gap) < width
+    return np.abs(gap) < touch_width(tracks)
+
+
+def touch_width(tracks: Tracks) -> float:
+    """Greatest gap or overlap [m] of a rod that touches a wall."""
+    return max(SIGMAS * float(np.nanmedian(tracks.position_sigma)), ROUGH * float(tracks.radius.mean()))
 
 
 def find_lags(found: Mapping[int, Touches]) -> dict[int, int]:

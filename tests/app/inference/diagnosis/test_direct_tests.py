@@ -13,7 +13,6 @@ from rodsight.inference.diagnosis.direct_tests import (
     examine_poses,
     examine_sizes,
     examine_wall_places,
-    examine_walls,
     find_impossible_poses,
 )
 from rodsight.solver.bodies.rods import RodMaterial
@@ -115,62 +114,6 @@ def test_a_photograph_of_few_rods_is_not_repeated():
     status = np.where(np.isnan(few[..., 0]), np.uint8(TrackStatus.LOST), tracks.status)
     few[4, :3] = few[3, :3]
     assert examine_order(replace(tracks, position=few, status=status)) == []
-
-
-@pytest.mark.parametrize("creep", [(4e-4, -3e-4), (0.0, 8e-4)])
-def test_a_camera_that_moves_against_all_walls_leaves_no_wall_at_rest(creep):
-    shift = np.linspace(0.0, 1.0, FRAMES)[:, None, None] * np.array(creep)
-    tracks = rolling_tracks()
-    assert examine_walls(replace(tracks, position=tracks.position + shift), box()) == []
-
-
-def test_a_single_wall_does_not_show_a_camera_that_moves():
-    tracks = rolling_tracks()
-    rise = np.linspace(0.0, 1e-3, FRAMES)[:, None, None] * np.array([0.0, 1.0])
-    top = box().select(np.array([1]))
-    (found,) = examine_walls(replace(tracks, position=tracks.position + rise), top)
-    assert "penetrate wall 'top'" in found.evidence
-
-
-def test_a_wall_that_rods_penetrate_while_it_rests_is_named():
-    tracks, walls = rolling_tracks(), box()
-    assert examine_walls(tracks, walls) == []
-    rise = np.linspace(0.0, 1e-3, FRAMES)[:, None] * np.linspace(0.0, 1.0, N)
-    moved = replace(tracks, position=tracks.position + np.stack([0.0 * rise, rise], axis=-1))
-    (found,) = examine_walls(moved, walls)
-    assert found.cause == "wall_at_rest"
-    assert "penetrate wall 'top'" in found.evidence
-    endpoints = walls.endpoints.copy()
-    endpoints[:, 1, :, 1] += np.linspace(0.0, 1e-3, FRAMES)[:, None]
-    assert examine_walls(moved, replace(walls, endpoints=endpoints)) == []
-    endpoints[:, 1, :, 1] -= np.linspace(0.0, 2e-3, FRAMES)[:, None]  # it moves, but not with the rods
-    assert examine_walls(moved, replace(walls, endpoints=endpoints)) == []
-
-
-def test_rods_that_come_near_a_wall_do_not_penetrate_it():
-    tracks = rolling_tracks()
-    walls = box()
-    near = tracks.position.copy()
-    near[..., 1] += 2e-3 * np.linspace(1.0, 0.0, FRAMES)[:, None]  # they sink to the bottom
-    opened = WallTracks(("bottom",), walls.endpoints[:, :1], np.full(1, np.nan))
-    assert examine_walls(replace(tracks, position=near), opened) == []
-    beyond = near - [0.0, 2e-3]
-    (found,) = examine_walls(replace(tracks, position=beyond), opened)
-    assert found.cause == "wall_at_rest"
-
-
-def test_rods_in_the_half_of_a_box_that_slides_do_not_penetrate_the_other_half():
-    tracks = rolling_tracks()
-    side = SIDE * PITCH
-    halves = np.array([[[side, 0.0], [side, 0.5 * side]], [[side, 0.5 * side], [side, side]]])
-    endpoints = np.repeat(halves[None], FRAMES, axis=0)
-    slide = np.linspace(0.0, 5e-3, FRAMES)
-    endpoints[:, 1, :, 0] += slide[:, None]
-    x, y = (each.ravel() * PITCH + RADIUS for each in np.meshgrid(np.arange(SIDE), np.arange(SIDE)))
-    place = np.broadcast_to(np.stack([x, y], axis=-1), (FRAMES, N, 2)).copy()
-    place[..., 0] += slide[:, None] * (y > 0.5 * side)
-    split = WallTracks(("low", "high"), endpoints, np.full(2, np.nan))
-    assert examine_walls(replace(tracks, position=place), split) == []
 
 
 def test_photographs_in_random_order_are_named():
