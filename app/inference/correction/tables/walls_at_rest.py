@@ -133,8 +133,7 @@ def _motion(tracks: Tracks, k: int, rows: NDArray[np.intp], ends: Array) -> Arra
     place = (tracks.position[k, rows] - ends[0]) @ along / length
     middle, slope = float(np.median(gap)), 0.0
     if len(rows) >= FEWEST_TURNING and np.ptp(place) > SPREAD:
-        line = theilslopes(gap, place)
-        slope, middle = float(line[0]), float(line[1])
+        slope, middle = np.asarray(theilslopes(gap, place)[:2], dtype=np.float64).tolist()
     turned = np.nan_to_num(tracks.rotation[k, rows] - tracks.rotation[k - 1, rows])
     around = np.array([-normal[1], normal[0]])  # motion of the point at the wall for a unit of rotation and radius
     moved = tracks.position[k, rows] - tracks.position[k - 1, rows]
