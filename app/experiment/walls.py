@@ -157,7 +157,10 @@ def describe_walls_at_rest(experiment: Experiment, frame_count: int) -> list[str
     still = [names[w] for w in np.flatnonzero(_given_in_frame_0_alone(frame, row, len(names))).tolist()]
     if not still or _follows_bars(experiment, section, frame):
         return []
-    return [f"{section.file} gives {', '.join(still)} in frame 0 alone: taken as at rest in all {frame_count} frames."]
+    return [
+        f"{section.file} gives {', '.join(still)} in frame 0 alone: taken as at rest in all {frame_count} frames, "
+        "unless the rods that touch them show that they move."
+    ]
 
 
 def _given_in_frame_0_alone(frame: NDArray[np.int64], row: NDArray[np.int64], count: int) -> NDArray[np.bool_]:
