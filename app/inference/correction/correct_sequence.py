@@ -30,6 +30,7 @@ from .softness import assume_softness, find_softness
 from .tables.outliers import remove_outliers, restore_exchanged_ids
 from .tables.rotations import correct_rotations
 from .tables.short_gaps import interpolate_short_gaps
+from .tables.wall_places import correct_wall_places
 from .tables.wall_times import correct_wall_times
 from .tables.walls_at_rest import correct_walls_at_rest
 from .unseen import add_unseen
@@ -93,6 +94,8 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
             tracks, walls, remarks["camera"], lens = correct_camera(
                 material, tracks, walls, failed, radii_known=settings.radii_are_known
             )
+        if not nothing_seen:
+            walls, remarks["places"] = correct_wall_places(tracks, walls)
         if settings.sequence.measure_precision:
             tracks, remarks["noise"] = measure_noise(tracks, walls)
         tracks, walls, boundary = correct_walls(settings.boundary, tracks, walls)

@@ -87,8 +87,9 @@ CAUSES: dict[str, Cause] = {
         corrected=True,
     ),
     "wall_misplaced": Cause(
-        "rods stand beyond a wall, which then carries too much force, or none",
-        "correct the ends of the wall",
+        "rods stand beyond a wall or touch none of it: it then carries too much force, or none",
+        "a run moves it to the rods that touch it: correct the ends of the wall",
+        corrected=True,
     ),
     "walls_shifted": Cause(
         "rods seem to penetrate walls or to leave them",

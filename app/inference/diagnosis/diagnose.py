@@ -25,6 +25,7 @@ from ...tracks import Tracks, WallTracks
 from ..correction.correct_sequence import complete_walls, correct_sequence
 from ..correction.tables.outliers import restore_exchanged_ids
 from ..correction.tables.rotations import correct_rotations
+from ..correction.tables.wall_places import correct_wall_places
 from ..correction.tables.wall_times import correct_wall_times
 from ..correction.tables.walls_at_rest import correct_walls_at_rest
 from ..inputs import Inputs
@@ -99,14 +100,20 @@ def diagnose(
     names += [each for each in rotations if each.corrected]
     inputs = replace(inputs, tracks=turned)
     if inputs.settings.boundary is not None:
-        walls, moved = _examine_moving_walls(turned, walls)
+        walls, moved = _examine_walls(turned, walls)
         names += [each for each in moved if each.corrected]
     sought = not undisturbed and seeks_distortion(inputs, walls, failed)
     tracks, walls, camera = undistorted(inputs, walls, failed, camera=sought)
     found = [each for each in rotations if not each.corrected]
     found += [*examine_order(tracks), *examine_smoothing(inputs.tracks)]
-    moving = (replace(each, corrected=False) for each in _examine_moving_walls(tracks, walls)[1])
-    found += list(moving) or examine_wall_places(tracks, walls)
+    moving = [replace(each, corrected=False) for each in _examine_walls(tracks, walls)[1]]
+    placed, apart = correct_wall_places(tracks, walls)
+    if apart and inputs.settings.boundary is not None:
+        walls = placed
+        names.append(finding("wall_misplaced", apart, corrected=True))
+    elif apart:
+        moving.append(finding("wall_misplaced", apart, corrected=False))
+    found += moving or examine_wall_places(tracks, walls)
     found += examine_sizes(tracks, walls) or examine_sections(tracks)
     found += examine_inertia(tracks, walls, inputs.material) + examine_load(tracks, walls, inputs.material)
     impossible = np.zeros(tracks.status.shape, np.bool_) if undisturbed else find_impossible_poses(tracks, walls)
@@ -133,7 +140,7 @@ def _examine_rotations(inputs: Inputs, tracks: Tracks, walls: WallTracks) -> tup
     return corrected, [finding(each.cause, each.evidence, corrected=each.corrected) for each in wrong]
 
 
-def _examine_moving_walls(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, list[Finding]]:
+def _examine_walls(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, list[Finding]]:
     """Return the walls as a run moves them, and name those that are late or stated at rest."""
     walls, late = correct_wall_times(tracks, walls)
     walls, resting = correct_walls_at_rest(tracks, walls)

@@ -163,7 +163,7 @@ def examine_wall_places(tracks: Tracks, walls: WallTracks) -> list[Finding]:
         gap = gap[np.isfinite(gap)]
         if len(gap) and float(np.median(gap)) < -allowed:
             words = f"rods stand {1e3 * -float(np.median(gap)):.2g} mm beyond wall '{walls.name[w]}'"
-            found.append(finding("wall_misplaced", words))
+            found.append(finding("wall_misplaced", words, corrected=False))
     return found
 
 

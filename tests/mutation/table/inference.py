@@ -206,6 +206,16 @@ MUTANTS = [
         ("rotation=factor * tracks.rotation", "rotation=tracks.rotation"),
     ),
     *mutants_of(
+        "app/inference/correction/tables/wall_places.py",
+        f"{TESTS}/tables/test_wall_places.py",
+        ("not touched - {w}", "False"),
+        ("alike = abs(halves[0] - halves[1]) <= each.width", "alike = True"),
+        ("and each.fraction(place) > MOST)", ")"),
+        ("max(MORE * stated, FEWEST)", "FEWEST"),
+        ("endpoints[:, w] -= place", "endpoints[:, w] += place"),
+        ("np.arange(-BEFORE, BEHIND, 0.25)", "np.arange(BEHIND, 2.0 * BEHIND, 0.25)"),
+    ),
+    *mutants_of(
         "app/inference/correction/tables/walls_at_rest.py",
         f"{TESTS}/tables/test_walls_at_rest.py",
         ("    still = [w for w in given if _is_still(tracks, walls, w)]", "    still = list(given)"),
