@@ -208,11 +208,12 @@ MUTANTS = [
     *mutants_of(
         "app/inference/correction/tables/wall_places.py",
         f"{TESTS}/tables/test_wall_places.py",
-        ("not touched - {w}", "False"),
-        ("alike = abs(halves[0] - halves[1]) <= each.width", "alike = True"),
-        ("and each.fraction(place) > MOST)", ")"),
+        ("if place is None or not touched:", "if place is None:"),
+        ("or not each.fraction(place) > MOST", ""),
         ("max(MORE * stated, FEWEST)", "FEWEST"),
-        ("endpoints[:, w] -= place", "endpoints[:, w] += place"),
+        ("endpoints[:, w] -= ends", "endpoints[:, w] += ends"),
+        ("np.array([-0.5, 0.5])", "np.array([0.5, -0.5])"),
+        ("steps = int(STEEPEST * self.length / loose) + 1", "steps = 0"),
         ("np.arange(-BEFORE, BEHIND, 0.25)", "np.arange(BEHIND, 2.0 * BEHIND, 0.25)"),
     ),
     *mutants_of(

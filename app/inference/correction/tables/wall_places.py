@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import theilslopes
 
 from ....solver.bodies.grains import Array
 from ....solver.bodies.wall_shapes import STRAIGHT, outward_normals
@@ -13,39 +14,61 @@ from .wall_times import NEAR, rods_beside, touch_width
 
 NEAREST = 3  # rod at a wall, in the order of their gaps, beside whose gap the place of the wall is sought …
 BEFORE, BEHIND = 4.0, 8.0  # … from so many widths of touching before it to so many behind it
+STEEPEST = 0.03  # slope of a wall against its stated direction
+LOOSE = 3.0  # widths of touching with which its place is sought, before a robust line through the gaps (Theil and Sen)
 # Times as many rods that touch it there as where it is stated, their number, and their fraction of the rods near it.
 MORE, FEWEST, MOST = 4.0, 20, 0.45
+STATED = (0.0, 0.0)  # place of a wall as it is stated
 
 
 @dataclass(frozen=True, slots=True)
 class _Gaps:
     """Gaps of the rods beside a wall as it is stated."""
 
-    of_frames: list[Array]  # (m,) [m] of each photograph, ascending
+    of_frames: list[Array]  # (2, m) [m] of each photograph: gaps, and places along the wall from its middle
     width: float  # [m] of touching
     near: float  # [m] of rods near it
+    length: float  # [m] of the wall
 
-    def count(self, place: float, *, within: float | None = None) -> int:
-        """Rods within the width of touching, or another distance, of a wall that lies a distance [m] further inside."""
+    def against(self, slope: float) -> Array:
+        """Gaps (p,) [m] of all photographs from a wall of some slope, ascending."""
+        return np.sort(np.concatenate([gap - slope * along for gap, along in self.of_frames]))
+
+    def count(self, place: tuple[float, float], *, within: float | None = None) -> int:
+        """Rods that touch a wall, or are within a distance of it, that lies a distance [m] inside, with a slope."""
+        distance, slope = place
         reach = self.width if within is None else within
-        ends = (place - reach, place + reach)
-        return int(sum(np.diff(np.searchsorted(gap, ends))[0] for gap in self.of_frames))
+        return int(np.diff(np.searchsorted(self.against(slope), (distance - reach, distance + reach)))[0])
 
-    def fraction(self, place: float) -> float:
-        """Fraction of the rods near a wall at some place [m] that touch it."""
+    def fraction(self, place: tuple[float, float]) -> float:
+        """Fraction of the rods near a wall at some place that touch it."""
         return self.count(place) / max(self.count(place, within=self.near), 1)
 
-    def find_place(self) -> float:
-        """Place [m] beside the outermost rods at which most of them touch it; NaN where few are beside it."""
-        outermost = [gap[NEAREST - 1] for gap in self.of_frames if len(gap) >= NEAREST]
-        if not outermost:
-            return np.nan
-        places = float(np.median(outermost)) + self.width * np.arange(-BEFORE, BEHIND, 0.25)
-        return float(places[int(np.argmax([self.count(each) for each in places]))])
+    def find_place(self) -> tuple[float, float] | None:
+        """Place beside the outermost rods at which most of them touch the wall; None where few are beside it."""
+        if not any(each.shape[1] >= NEAREST for each in self.of_frames):
+            return None
+        loose = LOOSE * self.width
+        steps = int(STEEPEST * self.length / loose) + 1
+        found = [self._best(loose / self.length * step, loose) for step in sorted(range(-steps, steps + 1), key=abs)]
+        _, distance, slope = max(found, key=lambda each: each[0])
+        gap, along = np.concatenate(self.of_frames, axis=1)
+        near = np.abs(gap - slope * along - distance) < loose
+        slope, distance = np.asarray(theilslopes(gap[near], along[near])[:2], dtype=np.float64).tolist()
+        return distance, slope
 
-    def half(self, first: int) -> _Gaps:
-        """The same of every second photograph."""
-        return replace(self, of_frames=self.of_frames[first::2])
+    def _best(self, slope: float, width: float) -> tuple[int, float, float]:
+        """Greatest number of rods that touch a wall of some slope beside the outermost ones; distance and slope."""
+        outermost = [
+            np.partition(gap - slope * along, NEAREST - 1)[NEAREST - 1]
+            for gap, along in self.of_frames
+            if len(gap) >= NEAREST
+        ]
+        distance = float(np.median(outermost)) + width * np.arange(-BEFORE, BEHIND, 0.25)
+        ends = np.searchsorted(self.against(slope), np.stack([distance - width, distance + width]))
+        count = ends[1] - ends[0]
+        best = int(np.argmax(count))
+        return int(count[best]), float(distance[best]), slope
 
 
 def correct_wall_places(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, str]:
@@ -60,29 +83,40 @@ def correct_wall_places(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, 
     Notes
     -----
     Counted are rods of all photographs whose gap is within three standard deviations of a position of the same
-    distance; even and odd photographs must show the same by themselves. Another wall must be touched as it is stated:
-    wrong radii and a wrong scale move rods away from all walls, or beyond all.
+    distance, or of the same line. Another wall must be touched as it is stated: wrong radii and a wrong scale move rods
+    away from all walls, or beyond all.
     """
     gaps = {w: _measure(tracks, walls, w) for w in np.flatnonzero(walls.sides == STRAIGHT).tolist()}
-    touched = {w for w, each in gaps.items() if each.fraction(0.0) > MOST}
+    touched = {w for w, each in gaps.items() if each.fraction(STATED) > MOST}
     endpoints, words = walls.endpoints.copy(), []
-    for w, each in gaps.items():
-        place = each.find_place()
-        if np.isnan(place) or not touched - {w}:
+    for w in gaps.keys() - touched:
+        each, place = gaps[w], gaps[w].find_place()
+        if place is None or not touched:
             continue
-        there, stated = each.count(place), each.count(0.0)
-        halves = [each.half(first).find_place() for first in (0, 1)]
-        alike = abs(halves[0] - halves[1]) <= each.width
-        if not (alike and there >= max(MORE * stated, FEWEST) and each.fraction(place) > MOST):
+        there, stated = each.count(place), each.count(STATED)
+        if there < max(MORE * stated, FEWEST) or not each.fraction(place) > MOST:
             continue
-        endpoints[:, w] -= place * outward_normals(walls.endpoints[:, w])[:, None]
-        where = f"{1e3 * abs(place):.2g} mm too far {'outside' if place > 0.0 else 'inside'}"
-        words.append(
-            f"wall '{walls.name[w]}' is stated {where}: {there} rods touch it in its right place, {stated} as stated"
-        )
+        ends = place[0] + place[1] * each.length * np.array([-0.5, 0.5])  # at the ends
+        endpoints[:, w] -= ends[:, None] * outward_normals(walls.endpoints[:, w])[:, None]
+        words.append(f"{_describe(walls.name[w], ends)}: {there} rods touch it in its right place, {stated} as stated")
     return (replace(walls, endpoints=endpoints), "; ".join(words)) if words else (walls, "")
 
 
+def _describe(name: str, ends: Array) -> str:
+    """Describe the right places [m] of both ends of a wall, as far inside of the stated ones."""
+    inside, turned = 1e3 * float(ends.mean()), 1e3 * float(np.ptp(ends))
+    wrong = (
+        [f"{abs(inside):.2g} mm too far {'outside' if inside > 0.0 else 'inside'}"] if turned < 4 * abs(inside) else []
+    )
+    wrong += [f"turned by {turned:.2g} mm from end to end"] if turned > abs(inside) else []
+    return f"wall '{name}' is stated {' and '.join(wrong)}"
+
+
 def _measure(tracks: Tracks, walls: WallTracks, w: int) -> _Gaps:
-    frames = [np.sort(rods_beside(tracks, k, walls.endpoints[k, w])[1]) for k in range(tracks.frame_count)]
-    return _Gaps(frames, touch_width(tracks), NEAR * float(tracks.radius.mean()))
+    frames = []
+    for k, ends in enumerate(walls.endpoints[:, w]):
+        rows, gap = rods_beside(tracks, k, ends)
+        along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+        frames.append(np.stack([gap, (tracks.position[k, rows] - ends.mean(axis=0)) @ along]))
+    length = float(np.linalg.norm(walls.endpoints[0, w, 1] - walls.endpoints[0, w, 0]))
+    return _Gaps(frames, touch_width(tracks), NEAR * float(tracks.radius.mean()), length)

@@ -10,7 +10,7 @@ import pytest
 from rodsight.inference.correction.tables.wall_places import correct_wall_places
 from rodsight.tracks import WallTracks
 
-from ..diagnosis.test_direct_tests import FRAMES, NOISE, RADIUS, SIDE, N, box, rolling_tracks
+from ..diagnosis.test_direct_tests import FRAMES, NOISE, PITCH, RADIUS, SIDE, N, box, rolling_tracks
 
 TOP, BOTTOM = 1, 0
 
@@ -41,6 +41,17 @@ def test_a_wall_is_moved_to_the_rods_that_touch_it(wall, distance, side):
     np.testing.assert_allclose(corrected.endpoints, box().endpoints, atol=2.0 * NOISE)
 
 
+@pytest.mark.parametrize("turn", [0.004, -0.02])
+def test_a_wall_is_turned_to_the_rods_that_touch_it(turn):
+    walls = misplaced(1e-3)
+    endpoints = walls.endpoints.copy()
+    endpoints[:, TOP, :, 1] += turn * (endpoints[:, TOP, :, 0] - 0.5 * SIDE * PITCH)
+    corrected, done = correct_wall_places(rolling_tracks(), replace(walls, endpoints=endpoints))
+    assert "1 mm too far outside" in done
+    assert (" and turned by 3.2 mm from end to end" in done) == (turn == -0.02)
+    np.testing.assert_allclose(corrected.endpoints[..., 1], box().endpoints[..., 1], atol=6.0 * NOISE)
+
+
 def test_the_place_counts_from_the_wall_as_it_moves():
     rise = 1e-3 * np.arange(FRAMES)
     tracks, walls = rolling_tracks(), misplaced(2e-3)
@@ -67,9 +78,8 @@ def test_a_rough_free_surface_is_no_wall():
     assert correct_wall_places(rough, walls) == (walls, "")
 
 
-def test_a_surface_that_moves_against_a_wall_is_no_wall():
-    tracks, walls = rolling_tracks(), misplaced(5e-3)
-    position = tracks.position.copy()
-    position[::2, N - SIDE :, 1] -= 10.0 * NOISE  # it rests at two places in turn
-    moving = replace(tracks, position=position)
-    assert correct_wall_places(moving, walls) == (walls, "")
+def test_a_wall_that_a_third_of_its_rods_touch_stays():
+    tracks, walls = rolling_tracks(), box()
+    radius = tracks.radius.copy()
+    radius[N - 6 :] -= 5e-4  # six of ten rods seem apart from the wall
+    assert correct_wall_places(replace(tracks, radius=radius), walls) == (walls, "")
