@@ -64,6 +64,8 @@ def correct_walls_at_rest(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks
     drifting = _drifting(tracks, walls)
     endpoints, found = walls.endpoints.copy(), []
     for w in still:
+        if w not in drifting and given[w][1] * MORE > 1.0:  # no motion shows so many more
+            continue
         followed = _follow(tracks, walls.endpoints[0, w])
         count, fraction = _touched(tracks, followed)
         shown = count >= MORE * max(given[w][0], 1) and fraction > (TOUCHED if w in drifting else MOST)
