@@ -43,7 +43,7 @@ TRUE_CAUSE: dict[ScenarioName, tuple[str, ...]] = {
     "class_2": ("class_radii",), "wrong_class": ("exchanged_sizes",),
     **dict.fromkeys(
         ("some_radii", "stepped_some_radii", "annulus_some_radii", "unloaded_some_radii"),
-        ("not_explained", "all_radii", "class_radii"),
+        ("not_explained", "all_radii", "class_radii", "exchanged_sizes"),
     ),
     "rising_lens": ("lens", "not_explained"),
     "outliers": ("outlier_tracks",), "one_jump": ("outlier_tracks",), "missing_poses": ("missing_poses",),
