@@ -14,6 +14,7 @@ from ..solver.frame_forces import FrameForces
 WEAK_FRACTION = 0.5  # of the mean f_n: below it a contact is drawn thin and grey
 DIFFERENCE_FRACTION = 0.4  # of the range: the difference of forces drawn widest and brightest
 TOP_QUANTILE = 0.998  # of all f_n > 0: above it width and colour are constant
+THINNEST, THICKEST = 0.022, 0.36  # line radius over grain radius, of a contact without force and of one at the top
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,15 +8,12 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from ...drawing.force_range import ForceRange
+from ...drawing.force_range import THICKEST, THINNEST, ForceRange
 from ...drawing.ramps import FORCE_RAMP, RAMP_LEVELS
 from ...solver.bodies.grains import Array
 from .canvas import Canvas
 from .colours import OPEN, WEAK, packed, packed_one
 from .values import strips
-
-THINNEST = 0.022  # line radius over grain radius, of a contact without force
-THICKEST = 0.36  # of a contact at the top
 
 _RAMP = packed(FORCE_RAMP)
 _WEAK, _OPEN = packed_one(WEAK), packed_one(OPEN)

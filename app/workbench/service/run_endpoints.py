@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from ...drawing.force_range import THICKEST, THINNEST
 from ...drawing.ramps import FORCE_RAMP
 from ...experiment.plausibility import check_packing
 from ...prediction import predict_accuracy, track_first_photographs
 from ...process.errors import InputError
 from ...recording.look.colours import DIFFERENCE_RAMP, GAP_RAMP, OPEN, PROBABILITY_RAMP, UNCERTAINTY_RAMP, WEAK
-from ...recording.look.force_style import THICKEST, THINNEST
 from ...run_folder import refuse_foreign_folder
 from ..inspecting.run_data import RunData, contact_history, frame_network, frame_summaries
 from .endpoints import Name, Whole, endpoint

@@ -7,10 +7,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from rodsight.drawing.force_range import ForceRange
+from rodsight.drawing.force_range import THICKEST, THINNEST, ForceRange
 from rodsight.drawing.ramps import FORCE_RAMP
 from rodsight.process.frame_range import FrameRange
-from rodsight.recording.look.force_style import THICKEST, THINNEST
 from rodsight.results.hdf5.store import load_results, origin_of, read_origin, save_results, save_tracks
 from rodsight.results.manifest import Manifest
 from rodsight.reviewing.judging.candidate_pairs import find_candidate_pairs
