@@ -41,17 +41,18 @@ function experimentTile(app, each) {
     picture,
     h("span", { class: "words" },
       h("b", {}, each.name, [".", each.name].includes(each.at) ? null : h("span", { class: "soft" }, ` in ${each.at}`)),
-      h("span", {}, each.error ?? (each.frames ? `${each.frames} photographs${run?.rods ? ` · ${run.rods} rods` : ""}` : "given tracks")),
+      h("span", {}, each.error ?? (each.frames ? `${photographs(each.frames)}${run?.rods ? ` · ${run.rods} rods` : ""}` : "given tracks")),
       h("span", { class: "row" }, status, run?.trust !== undefined && run?.trust !== null ? h("span", { class: "pill", title: "the least trust of a frame" }, `T ≥ ${run.trust.toFixed(2)}`) : null),
       h("span", { class: "dots", title: "photographs, scale, walls, rods, material" }, each.steps.map((mark) => sign(mark)))));
 }
 
+const photographs = (count) => `${count} photograph${count === 1 ? "" : "s"}`;
 const TONE = { settled: "good", settling: "good", rearranging: "doubtful", suspect: "bad", failed: "bad", reset: "", "out of date": "doubtful", "something is wrong": "bad" };
 
 function seriesTile(app, each) {
   return h("button", { class: "tile", onclick: () => app.queue(async () => app.open(await request("begin", { folder: each.folder, suffix: each.suffix, name: each.name, like: at("like")?.value || null })), "Reading photographs …", `begin ${each.folder} ${each.suffix}`) },
     h("img", { class: "picture", alt: "", src: `/thumbnail?${new URLSearchParams({ folder: each.folder, suffix: each.suffix })}` }),
-    h("span", { class: "words" }, h("b", {}, each.folder === "." ? each.name : each.folder), h("span", {}, `${each.count} photographs, ${each.first} … ${each.last}`), h("span", {}, "Set up an experiment from these")));
+    h("span", { class: "words" }, h("b", {}, each.folder === "." ? each.name : each.folder), h("span", {}, `${photographs(each.count)}, ${each.first} … ${each.last}`), h("span", {}, "Set up an experiment from these")));
 }
 
 function sampleTile(app) {
