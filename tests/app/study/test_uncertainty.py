@@ -31,7 +31,7 @@ def test_a_study_prints_coverages_and_constants(tmp_path, monkeypatch):
     monkeypatch.setattr("rodsight.study.report.uncertainty.simulate", lambda *_, **__: truth)
     monkeypatch.setattr("rodsight.study.report.uncertainty.WINDOW", 4)
     monkeypatch.setattr("rodsight.study.report.uncertainty.available_cores", lambda: 1)
-    monkeypatch.setattr("rodsight.study.report.uncertainty.NOISES", (1e-5,))
+    monkeypatch.setattr("rodsight.study.report.uncertainty.NOISES", (0.0, 1e-5))
     printed = StringIO()
     fit = study_uncertainty(
         ([0], [1]), members=2, grains=30, estimator="nlgs", folder=tmp_path, console=Console(file=printed, width=150)
