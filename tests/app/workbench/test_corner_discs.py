@@ -204,7 +204,7 @@ def test_a_frame_without_discs_has_bars_alone(visitor, photographs_only):
     (series,) = visitor.request("home")["series"]
     at = visitor.request("begin", **{key: series[key] for key in ("folder", "suffix", "name")})["at"]
     visitor.request("set_scale", at=at, pixel_size=2.5e-4)
-    visitor.request("detect_rods", at=at, radii=[])
+    visitor.request("detect_rods", at=at, radii=[0.007, 0.008, 0.011])
     described = visitor.request("find_walls", at=at)
     assert (described["bars"], described["discs"]) == (4, 0)
     assert not (photographs_only / "my photographs" / "corners.csv").exists()
