@@ -134,13 +134,14 @@ def test_a_process_holds_a_folder_once(tmp_path):
 
 
 def test_a_process_that_has_ended_does_not_live_although_its_status_was_not_read():
-    process = subprocess.Popen([sys.executable, "-c", ""], stdout=subprocess.PIPE)
-    assert process.stdout is not None
+    process = subprocess.Popen([sys.executable, "-c", "import sys; sys.stdin.read()"], stdin=subprocess.PIPE)
+    assert process.stdin is not None
     holder = Holder.of(process.pid)
     assert holder.is_alive
+    process.stdin.close()
     os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)  # ended, and still listed
     assert not holder.is_alive
-    process.communicate()
+    process.wait()
 
 
 def test_a_number_that_is_used_again_is_another_process(tmp_path):
