@@ -312,6 +312,11 @@ class WallTracks:
         return all_sides(self.side, self.count)
 
     @property
+    def straight(self) -> list[int]:
+        """Numbers of the straight walls."""
+        return np.flatnonzero(self.sides == STRAIGHT).tolist()
+
+    @property
     def loaded(self) -> NDArray[np.bool_]:
         """Whether a wall is a plate under a pressure or a load (w,)."""
         measured = False if self.load is None else np.isfinite(self.load).any(axis=0)

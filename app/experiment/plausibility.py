@@ -202,7 +202,7 @@ def rods_cut_by_walls(tracks: Tracks, walls: WallTracks) -> dict[str, int]:
     """
     place, radius = tracks.position[0], tracks.radius
     found = {}
-    for w in np.flatnonzero(walls.sides == STRAIGHT).tolist():
+    for w in walls.straight:
         ends = np.broadcast_to(walls.endpoints[0, w], (len(place), 2, 2))
         distance = np.abs(wall_distance(ends, None, place)[0])
         cut = (distance < CUT * radius) & beside_wall(ends, None, place, np.zeros(len(place)))

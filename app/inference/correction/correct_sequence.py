@@ -37,18 +37,9 @@ from .unseen import add_unseen
 
 # Corrections that the first frame reports, in this order.
 REMARKS = (
-    "outliers",
-    "gaps",
-    "camera",
-    "noise",
-    "span",
-    "size_classes",
-    "softness",
-    "resistance",
-    "sizes",
-    "ids",
-    "rotations",
-)
+    "outliers", "gaps", "camera", "noise", "span", "size_classes", "softness", "resistance", "sizes", "ids",
+    "rotations", "times", "rest", "places",
+)  # fmt: skip
 
 
 class CoordinationError(UndeterminedError):

@@ -10,7 +10,6 @@ from ...solver.bodies.grains import Array, Grains
 from ...solver.bodies.outer_grains import find_outer_grains
 from ...solver.bodies.rods import RodMaterial
 from ...solver.bodies.strain import displacement_gradient, inertial_time, shear_strain
-from ...solver.bodies.wall_shapes import STRAIGHT
 from ...solver.contacts.contacts import detect_contacts
 from ...tracks import Tracks, WallTracks
 from ..correction.radii import NAMED, find_oversized_rods, find_wrong_sizes
@@ -158,7 +157,7 @@ def examine_wall_places(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     """Look for straight walls that several rods stand beyond in every photograph."""
     allowed = max(BEYOND_SIGMAS * float(np.nanmedian(tracks.position_sigma)), BEYOND * float(tracks.radius.mean()))
     found = []
-    for w in np.flatnonzero(walls.sides == STRAIGHT).tolist():
+    for w in walls.straight:
         gap = np.array([near_gap(tracks, walls, k, w, nearest=SEVERAL) for k in range(tracks.frame_count)])
         gap = gap[np.isfinite(gap)]
         if len(gap) and float(np.median(gap)) < -allowed:

@@ -8,16 +8,14 @@ import numpy as np
 from scipy.stats import theilslopes
 
 from ....solver.bodies.grains import Array
-from ....solver.bodies.wall_shapes import STRAIGHT, outward_normals
+from ....solver.bodies.wall_shapes import outward_normals
 from ....tracks import Tracks, WallTracks
-from .wall_times import NEAR, rods_beside, touch_width
+from .wall_times import FEWEST, MORE, MOST, NEAR, rods_beside, touch_width
+from .walls_at_rest import NEAREST
 
-NEAREST = 3  # rod at a wall, in the order of their gaps, beside whose gap the place of the wall is sought …
-BEFORE, BEHIND = 4.0, 8.0  # … from so many widths of touching before it to so many behind it
+BEFORE, BEHIND = 4.0, 8.0  # widths of touching before and behind the NEAREST rod, between which a wall is sought
 STEEPEST = 0.03  # slope of a wall against its stated direction
 LOOSE = 3.0  # widths of touching with which its place is sought, before a robust line through the gaps (Theil and Sen)
-# Times as many rods that touch it there as where it is stated, their number, and their fraction of the rods near it.
-MORE, FEWEST, MOST = 4.0, 20, 0.45
 STATED = (0.0, 0.0)  # place of a wall as it is stated
 
 
@@ -50,22 +48,23 @@ class _Gaps:
             return None
         loose = LOOSE * self.width
         steps = int(STEEPEST * self.length / loose) + 1
-        found = [self._best(loose / self.length * step, loose) for step in sorted(range(-steps, steps + 1), key=abs)]
+        found = [self._best(loose / self.length * step) for step in sorted(range(-steps, steps + 1), key=abs)]
         _, distance, slope = max(found, key=lambda each: each[0])
         gap, along = np.concatenate(self.of_frames, axis=1)
         near = np.abs(gap - slope * along - distance) < loose
         slope, distance = np.asarray(theilslopes(gap[near], along[near])[:2], dtype=np.float64).tolist()
         return distance, slope
 
-    def _best(self, slope: float, width: float) -> tuple[int, float, float]:
-        """Greatest number of rods that touch a wall of some slope beside the outermost ones; distance and slope."""
+    def _best(self, slope: float) -> tuple[int, float, float]:
+        """Most rods that loosely touch a wall of some slope beside the outermost ones; its distance, and the slope."""
+        loose = LOOSE * self.width
         outermost = [
             np.partition(gap - slope * along, NEAREST - 1)[NEAREST - 1]
             for gap, along in self.of_frames
             if len(gap) >= NEAREST
         ]
-        distance = float(np.median(outermost)) + width * np.arange(-BEFORE, BEHIND, 0.25)
-        ends = np.searchsorted(self.against(slope), np.stack([distance - width, distance + width]))
+        distance = float(np.median(outermost)) + loose * np.arange(-BEFORE, BEHIND, 0.25)
+        ends = np.searchsorted(self.against(slope), np.stack([distance - loose, distance + loose]))
         count = ends[1] - ends[0]
         best = int(np.argmax(count))
         return int(count[best]), float(distance[best]), slope
@@ -86,12 +85,14 @@ def correct_wall_places(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, 
     distance, or of the same line. Another wall must be touched as it is stated: wrong radii and a wrong scale move rods
     away from all walls, or beyond all.
     """
-    gaps = {w: _measure(tracks, walls, w) for w in np.flatnonzero(walls.sides == STRAIGHT).tolist()}
+    gaps = {w: _measure(tracks, walls, w) for w in walls.straight}
     touched = {w for w, each in gaps.items() if each.fraction(STATED) > MOST}
+    if not touched:
+        return walls, ""
     endpoints, words = walls.endpoints.copy(), []
-    for w in gaps.keys() - touched:
-        each, place = gaps[w], gaps[w].find_place()
-        if place is None or not touched:
+    for w, each in gaps.items():
+        place = None if w in touched else each.find_place()
+        if place is None:
             continue
         there, stated = each.count(place), each.count(STATED)
         if there < max(MORE * stated, FEWEST) or not each.fraction(place) > MOST:

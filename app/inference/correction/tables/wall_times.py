@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.bodies.grains import Array
-from ....solver.bodies.wall_shapes import STRAIGHT, beside_wall, distance_from_walls, outward_normals
+from ....solver.bodies.wall_shapes import beside_wall, distance_from_walls, outward_normals
 from ....tracks import Tracks, WallTracks
 
 LAGS = np.linspace(-1.5, 1.5, 31)  # [photographs] by which walls may be late
@@ -69,7 +69,7 @@ def correct_wall_times(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, s
     that moves steadily and is late looks like one that is misplaced, with the same places after the correction: both
     are named unless clearly fewer rods touch it in the other place.
     """
-    found = {w: count_touches(tracks, walls, w) for w in np.flatnonzero(walls.sides == STRAIGHT).tolist()}
+    found = {w: count_touches(tracks, walls, w) for w in walls.straight}
     in_time = any(each.fraction(IN_TIME) > MOST for each in found.values())
     late = []
     for w, number in find_lags(found).items():

@@ -11,19 +11,18 @@ from numpy.typing import NDArray
 from scipy.stats import theilslopes
 
 from ....solver.bodies.grains import Array
-from ....solver.bodies.wall_shapes import STRAIGHT, behind_body, distance_from_walls, outward_normals
+from ....solver.bodies.wall_shapes import behind_body, distance_from_walls, outward_normals
 from ....tracks import Tracks, WallTracks
-from .wall_times import rods_beside, rods_near, touch_width, touching
+from .wall_times import MORE, MOST, rods_beside, rods_near, touch_width, touching
 
 DRIFT_SIGMAS = 15.0  # standard deviations of a position by which rods may leave or penetrate a wall …
 DRIFT = 0.02  # … and fraction of the mean radius
 TOGETHER = 0.2  # of the greatest change of a gap at a wall: what a common translation of all rods may leave
 NEAREST = 3  # rods at a wall: the distance of the third nearest is judged
 LATE = 1.0 / 3.0  # fraction of the photographs, the last ones, in which the rods at a wall are counted
-# Times as many rods that touch a wall that moves with them as one at rest, and fraction of the rods near it. Of
-# simulated walls at rest at most .48 of the near rods touch it if it moves, or others are not touched either.
-MORE, MOST = 4.0, 0.6
-TOUCHED = 0.45  # the same fraction where rods drift, and of some other wall: else all walls are wrong, or the camera
+# Fraction of the rods near a wall that touch it if it moves with them, MORE times as many as at rest; MOST where rods
+# drift. Of simulated walls at rest at most .48 of the near rods touch it if it moves, or others are not touched either.
+MOST_AT_REST = 0.6
 FEWEST = 3  # rods that show the motion of a wall …
 FEWEST_TURNING, SPREAD = 5, 0.3  # … and its turning, with the fraction of its length over which they spread
 NEARLY = 2.0  # widths of touching, in which rods touched a wall one photograph before
@@ -59,7 +58,7 @@ def correct_walls_at_rest(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks
     """
     if walls.count == 0 or tracks.frame_count < NEAREST:
         return walls, []
-    given = {w: _touched(tracks, walls.endpoints[:, w]) for w in np.flatnonzero(walls.sides == STRAIGHT).tolist()}
+    given = {w: _touched(tracks, walls.endpoints[:, w]) for w in walls.straight}
     still = [w for w in given if _is_still(tracks, walls, w)]
     drifting = _drifting(tracks, walls)
     endpoints, found = walls.endpoints.copy(), []
@@ -68,8 +67,9 @@ def correct_walls_at_rest(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks
             continue
         followed = _follow(tracks, walls.endpoints[0, w])
         count, fraction = _touched(tracks, followed)
-        shown = count >= MORE * max(given[w][0], 1) and fraction > (TOUCHED if w in drifting else MOST)
-        shown &= any(each[1] > TOUCHED for other, each in given.items() if other != w)
+        shown = count >= MORE * max(given[w][0], 1) and fraction > (MOST if w in drifting else MOST_AT_REST)
+        # Some other wall must be touched: else all walls are wrong, or the camera.
+        shown &= any(each[1] > MOST for other, each in given.items() if other != w)
         if w not in drifting and not shown:
             continue
         words = drifting.get(w, f"wall '{walls.name[w]}' does not move")
@@ -92,15 +92,14 @@ def _is_still(tracks: Tracks, walls: WallTracks, w: int) -> bool:
 def _drifting(tracks: Tracks, walls: WallTracks) -> dict[int, str]:
     """Walls that rods leave or penetrate by far, with the evidence if they rest."""
     allowed = _allowed(tracks)
-    gaps = {w: _first_and_last_gap(tracks, walls, w) for w in np.flatnonzero(walls.sides == STRAIGHT).tolist()}
+    gaps = {w: _first_and_last_gap(tracks, walls, w) for w in walls.straight}
     changes = {w: last - first for w, (first, last) in gaps.items() if np.isfinite(last - first)}
     if _moved_together(walls, changes):
         return {}
     found = {}
     for w, change in changes.items():
-        loaded = np.isfinite(walls.pressure[w]) or (walls.load is not None and np.isfinite(walls.load[:, w]).any())
         penetrated = max(change, gaps[w][1]) < -allowed  # rods that only come near a wall do not
-        if penetrated or (loaded and change > allowed):
+        if penetrated or (walls.loaded[w] and change > allowed):
             does = "penetrate" if change < 0 else "leave"
             found[w] = f"rods {does} wall '{walls.name[w]}', which does not move, by {1e3 * abs(change):.2g} mm"
     return found
