@@ -14,7 +14,7 @@ from ...solver.contacts.contacts import detect_contacts
 from ...tracks import Tracks, WallTracks
 from ..correction.radii import NAMED, find_oversized_rods, find_wrong_sizes
 from ..correction.tables.outliers import find_outliers, walls_in
-from ..correction.tables.walls_at_rest import near_gap
+from ..correction.tables.rods_at_walls import RodsAtWalls
 from ..snapshots import grains_of
 from .causes import finding
 
@@ -156,9 +156,9 @@ def examine_inertia(tracks: Tracks, walls: WallTracks, material: RodMaterial) ->
 def examine_wall_places(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     """Look for straight walls that several rods stand beyond in every photograph."""
     allowed = max(BEYOND_SIGMAS * float(np.nanmedian(tracks.position_sigma)), BEYOND * float(tracks.radius.mean()))
-    found = []
+    rods, found = RodsAtWalls.of(tracks), []
     for w in walls.straight:
-        gap = np.array([near_gap(tracks, walls, k, w, nearest=SEVERAL) for k in range(tracks.frame_count)])
+        gap = np.array([rods.nearest_gap(k, walls, w, SEVERAL) for k in range(tracks.frame_count)])
         gap = gap[np.isfinite(gap)]
         if len(gap) and float(np.median(gap)) < -allowed:
             words = f"rods stand {1e3 * -float(np.median(gap)):.2g} mm beyond wall '{walls.name[w]}'"

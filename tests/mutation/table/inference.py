@@ -87,8 +87,8 @@ MUTANTS = [
         ("dtype=np.float64) + lag)", "dtype=np.float64) - lag)"),
         ("        if now > then:", "        if False:"),
         ("np.clip(np.floor(time).astype(np.intp), 0,", "np.clip(np.floor(time).astype(np.intp), -5,"),
-        ("if touch - moved <= SIGMAS * np.sqrt(touch):", "if False:"),
-        ("if touch - moved <= SIGMAS * np.sqrt(touch):", "if True:"),
+        ("if touch - moved <= CLEARLY * np.sqrt(touch):", "if False:"),
+        ("if touch - moved <= CLEARLY * np.sqrt(touch):", "if True:"),
     ),
     *mutants_of(
         "app/inference/diagnosis/smoothed_tracks.py",

@@ -10,7 +10,8 @@ from scipy.stats import theilslopes
 from ....solver.bodies.grains import Array
 from ....solver.bodies.wall_shapes import outward_normals
 from ....tracks import Tracks, WallTracks
-from .wall_times import FEWEST, MORE, MOST, NEAR, rods_beside, touch_width
+from .rods_at_walls import RodsAtWalls
+from .wall_times import FEWEST, MORE, MOST
 from .walls_at_rest import NEAREST
 
 BEFORE, BEHIND = 4.0, 8.0  # widths of touching before and behind the NEAREST rod, between which a wall is sought
@@ -85,7 +86,8 @@ def correct_wall_places(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, 
     distance, or of the same line. Another wall must be touched as it is stated: wrong radii and a wrong scale move rods
     away from all walls, or beyond all.
     """
-    gaps = {w: _measure(tracks, walls, w) for w in walls.straight}
+    rods = RodsAtWalls.of(tracks)
+    gaps = {w: _measure(rods, walls, w) for w in walls.straight}
     touched = {w for w, each in gaps.items() if each.fraction(STATED) > MOST}
     if not touched:
         return walls, ""
@@ -113,11 +115,11 @@ def _describe(name: str, ends: Array) -> str:
     return f"wall '{name}' is stated {' and '.join(wrong)}"
 
 
-def _measure(tracks: Tracks, walls: WallTracks, w: int) -> _Gaps:
+def _measure(rods: RodsAtWalls, walls: WallTracks, w: int) -> _Gaps:
     frames = []
     for k, ends in enumerate(walls.endpoints[:, w]):
-        rows, gap = rods_beside(tracks, k, ends)
+        rows, gap = rods.beside(k, ends)
         along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
-        frames.append(np.stack([gap, (tracks.position[k, rows] - ends.mean(axis=0)) @ along]))
+        frames.append(np.stack([gap, (rods.tracks.position[k, rows] - ends.mean(axis=0)) @ along]))
     length = float(np.linalg.norm(walls.endpoints[0, w, 1] - walls.endpoints[0, w, 0]))
-    return _Gaps(frames, touch_width(tracks), NEAR * float(tracks.radius.mean()), length)
+    return _Gaps(frames, rods.width, rods.reach, length)

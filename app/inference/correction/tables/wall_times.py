@@ -7,22 +7,20 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.bodies.grains import Array
-from ....solver.bodies.wall_shapes import beside_wall, distance_from_walls, outward_normals
+from ....solver.bodies.wall_shapes import outward_normals
 from ....tracks import Tracks, WallTracks
+from .rods_at_walls import RodsAtWalls
 
 LAGS = np.linspace(-1.5, 1.5, 31)  # [photographs] by which walls may be late
 IN_TIME = int(np.argmin(np.abs(LAGS)))
 LEAST_LAG = 0.15  # [photographs] below which walls count as in time
-NEAR = 1.0  # mean radius up to which the gap of a rod is looked at
-SIGMAS = 3.0  # standard deviations of a position up to which a gap is that of a contact
-ROUGH = 2e-3  # mean radius, the same of rods whose radii are known no better
 # Times as many contacts as in time, fraction of the rods near the wall, and contacts, from which a wall is late. Of
 # simulated walls in time, .55 to .85 of the rods near them touch, of those that are late .39 to .7; with wrong radii or
 # a wrong camera at most .45 touch at any time, and 2.4 times as many at a wall that soft rods overlap.
 MORE, MOST, FEWEST = 4.0, 0.45, 20
+CLEARLY = 3.0  # standard deviations of a count of rods by which more touch a wall in one place than in another
 MORE_TOGETHER, FEWEST_TOGETHER = 2.0, 8  # of a wall that shares its lag with one that is late by these
 ALIKE = 0.2  # [photographs] by which the lags of two halves of the photographs, or of several walls, may differ
 
@@ -69,62 +67,38 @@ def correct_wall_times(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, s
     that moves steadily and is late looks like one that is misplaced, with the same places after the correction: both
     are named unless clearly fewer rods touch it in the other place.
     """
-    found = {w: count_touches(tracks, walls, w) for w in walls.straight}
+    rods = RodsAtWalls.of(tracks)
+    found = {w: _count_touches(rods, walls, w) for w in walls.straight}
     in_time = any(each.fraction(IN_TIME) > MOST for each in found.values())
     late = []
     for w, number in find_lags(found).items():
         count, apart = found[w].touching.sum(axis=0), bool(found[w].gap[:, number].sum() > 0.0)
         lag, counts = float(LAGS[number]), (int(count[number]), int(count[IN_TIME]))
-        late.append(_Late(lag, walls.name[w], *counts, apart, *_misplaced(tracks, walls, w, lag)))
+        late.append(_Late(lag, walls.name[w], *counts, apart, *_misplaced(rods, walls, w, lag)))
     if not late or not (in_time or len({each.apart for each in late}) == 2):
         return walls, ""
     endpoints = walls.endpoints.copy()
     for each in late:
         w = walls.name.index(each.name)
-        endpoints[:, w] = _move_in_time(tracks, walls.endpoints[:, w], each.lag)
+        endpoints[:, w] = _move_in_time(rods, walls.endpoints[:, w], each.lag)
     late.sort()
     groups = np.split(np.arange(len(late)), np.flatnonzero(np.diff([each.lag for each in late]) > ALIKE) + 1)
     words = [_describe([late[each] for each in group]) for group in groups]
     return replace(walls, endpoints=endpoints), "; ".join(words)
 
 
-def count_touches(tracks: Tracks, walls: WallTracks, w: int) -> Touches:
+def _count_touches(rods: RodsAtWalls, walls: WallTracks, w: int) -> Touches:
     """Count the rods at wall w."""
-    frames = tracks.frame_count
+    frames = rods.tracks.frame_count
     found = Touches(*np.zeros((3, frames, len(LAGS))))
     for k in range(frames):
-        here, own = rods_near(tracks, k, walls.endpoints[k, w])
+        here, own = rods.near(k, walls.endpoints[k, w])
         known = (k + LAGS >= 0.0) & (k + LAGS <= frames - 1)
         ends = _at(walls.endpoints[:, w], k + LAGS[known])
-        touches = touching(tracks, k, here, ends)
+        touches = rods.touching(k, here, ends)
         found.touching[k, known], found.near[k, known] = touches.sum(axis=1), len(here)
         found.gap[k, known] = touches @ own
     return found
-
-
-def rods_beside(tracks: Tracks, k: int, ends: Array) -> tuple[NDArray[np.intp], Array]:
-    """Rods (m,) of photograph k that project onto a straight wall (2, 2), and their gaps from it (m,) [m]."""
-    here = np.flatnonzero(tracks.present_in(k))
-    here = here[beside_wall(ends, None, tracks.position[k, here], np.zeros(len(here)))]
-    return here, distance_from_walls(ends, None, tracks.position[k, here]) - tracks.radius[here]
-
-
-def rods_near(tracks: Tracks, k: int, ends: Array) -> tuple[NDArray[np.intp], Array]:
-    """Rods (m,) of photograph k near a straight wall (2, 2), and their gaps from it (m,) [m]."""
-    here, gap = rods_beside(tracks, k, ends)
-    near = np.abs(gap) < NEAR * float(tracks.radius.mean())
-    return here[near], gap[near]
-
-
-def touching(tracks: Tracks, k: int, here: NDArray[np.intp], ends: Array) -> NDArray[np.bool_]:
-    """Whether rods (m,) of photograph k touch a wall that has ends (t, 2, 2): (t, m)."""
-    gap = distance_from_walls(ends[:, None], None, tracks.position[k, here]) - tracks.radius[here]
-    return np.abs(gap) < touch_width(tracks)
-
-
-def touch_width(tracks: Tracks) -> float:
-    """Greatest gap or overlap [m] of a rod that touches a wall."""
-    return max(SIGMAS * float(np.nanmedian(tracks.position_sigma)), ROUGH * float(tracks.radius.mean()))
 
 
 def find_lags(found: Mapping[int, Touches]) -> dict[int, int]:
@@ -151,25 +125,25 @@ def _find_lag(found: Touches, more: float, fewest: int, most: float) -> int:
     return best if abs(halves[0] - halves[1]) <= ALIKE else IN_TIME
 
 
-def _misplaced(tracks: Tracks, walls: WallTracks, w: int, lag: float) -> tuple[int, float]:
+def _misplaced(rods: RodsAtWalls, walls: WallTracks, w: int, lag: float) -> tuple[int, float]:
     """Count rods that touch wall w if it is misplaced by its median motion in a lag; its greatest normal motion [m]."""
-    time = np.arange(tracks.frame_count, dtype=np.float64) + lag
-    known = np.flatnonzero((time >= 0.0) & (time <= tracks.frame_count - 1))
+    time = np.arange(rods.tracks.frame_count, dtype=np.float64) + lag
+    known = np.flatnonzero((time >= 0.0) & (time <= rods.tracks.frame_count - 1))
     given = walls.endpoints[:, w]
     shift = np.median(_at(given, time[known]) - given[known], axis=0)
     count = 0
     for k in known.tolist():
-        here = rods_near(tracks, k, given[k])[0]
-        count += int(touching(tracks, k, here, (given[k] + shift)[None]).sum())
+        here = rods.near(k, given[k])[0]
+        count += int(rods.touching(k, here, (given[k] + shift)[None]).sum())
     return count, float(np.abs(shift @ outward_normals(given.mean(axis=0))).max())
 
 
-def _move_in_time(tracks: Tracks, given: Array, lag: float) -> Array:
+def _move_in_time(rods: RodsAtWalls, given: Array, lag: float) -> Array:
     """Ends (f, 2, 2) of a wall (f, 2, 2) that is late; as given where more rods touch it there, as before it moves."""
     moved = _at(given, np.arange(len(given), dtype=np.float64) + lag)
     for k in range(len(given)):
-        here = rods_near(tracks, k, given[k])[0]
-        then, now = touching(tracks, k, here, np.stack([moved[k], given[k]])).sum(axis=1)
+        here = rods.near(k, given[k])[0]
+        then, now = rods.touching(k, here, np.stack([moved[k], given[k]])).sum(axis=1)
         if now > then:
             moved[k] = given[k]
     return moved
@@ -184,7 +158,7 @@ def _describe(walls: list[_Late]) -> str:
     )
     touch, given, moved = (sum(each) for each in zip(*((w.touching, w.given, w.moved) for w in walls), strict=True))
     other = ""
-    if touch - moved <= SIGMAS * np.sqrt(touch):
+    if touch - moved <= CLEARLY * np.sqrt(touch):
         place = 1e3 * max(each.place for each in walls)
         other = f", or misplaced by up to {place:.2g} mm (a steady motion shows no difference)"
     return (

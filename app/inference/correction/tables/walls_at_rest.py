@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from scipy.stats import theilslopes
 
 from ....solver.bodies.grains import Array
-from ....solver.bodies.wall_shapes import behind_body, distance_from_walls, outward_normals
+from ....solver.bodies.wall_shapes import outward_normals
 from ....tracks import Tracks, WallTracks
-from .wall_times import MORE, MOST, rods_beside, rods_near, touch_width, touching
+from .rods_at_walls import RodsAtWalls
+from .wall_times import MORE, MOST
 
 DRIFT_SIGMAS = 15.0  # standard deviations of a position by which rods may leave or penetrate a wall …
 DRIFT = 0.02  # … and fraction of the mean radius
@@ -58,15 +59,16 @@ def correct_walls_at_rest(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks
     """
     if walls.count == 0 or tracks.frame_count < NEAREST:
         return walls, []
-    given = {w: _touched(tracks, walls.endpoints[:, w]) for w in walls.straight}
+    rods = RodsAtWalls.of(tracks)
+    given = {w: _touched(rods, walls.endpoints[:, w]) for w in walls.straight}
     still = [w for w in given if _is_still(tracks, walls, w)]
-    drifting = _drifting(tracks, walls)
+    drifting = _drifting(rods, walls)
     endpoints, found = walls.endpoints.copy(), []
     for w in still:
         if w not in drifting and given[w][1] * MORE > 1.0:  # no motion shows so many more
             continue
-        followed = _follow(tracks, walls.endpoints[0, w])
-        count, fraction = _touched(tracks, followed)
+        followed = _follow(rods, walls.endpoints[0, w])
+        count, fraction = _touched(rods, followed)
         shown = count >= MORE * max(given[w][0], 1) and fraction > (MOST if w in drifting else MOST_AT_REST)
         # Some other wall must be touched: else all walls are wrong, or the camera.
         shown &= any(each[1] > MOST for other, each in given.items() if other != w)
@@ -89,10 +91,10 @@ def _is_still(tracks: Tracks, walls: WallTracks, w: int) -> bool:
     return float(np.abs(walls.endpoints[:, w] - walls.endpoints[0, w]).max()) < _allowed(tracks)
 
 
-def _drifting(tracks: Tracks, walls: WallTracks) -> dict[int, str]:
+def _drifting(rods: RodsAtWalls, walls: WallTracks) -> dict[int, str]:
     """Walls that rods leave or penetrate by far, with the evidence if they rest."""
-    allowed = _allowed(tracks)
-    gaps = {w: _first_and_last_gap(tracks, walls, w) for w in walls.straight}
+    allowed = _allowed(rods.tracks)
+    gaps = {w: _first_and_last_gap(rods, walls, w) for w in walls.straight}
     changes = {w: last - first for w, (first, last) in gaps.items() if np.isfinite(last - first)}
     if _moved_together(walls, changes):
         return {}
@@ -105,32 +107,33 @@ def _drifting(tracks: Tracks, walls: WallTracks) -> dict[int, str]:
     return found
 
 
-def _touched(tracks: Tracks, ends: Array) -> tuple[int, float]:
+def _touched(rods: RodsAtWalls, ends: Array) -> tuple[int, float]:
     """Rods that touch a wall with ends (f, 2, 2) in the last photographs, and their fraction of those near it."""
     count, near = 0, 0
     for k in range(int((1.0 - LATE) * len(ends)), len(ends)):
-        rows, _ = rods_near(tracks, k, ends[k])
-        count += int(touching(tracks, k, rows, ends[k][None]).sum())
+        rows, _ = rods.near(k, ends[k])
+        count += int(rods.touching(k, rows, ends[k][None]).sum())
         near += len(rows)
     return count, count / max(near, 1)
 
 
-def _follow(tracks: Tracks, ends: Array) -> Array:
+def _follow(rods: RodsAtWalls, ends: Array) -> Array:
     """Ends (f, 2, 2) of a wall that begins at some (2, 2) and moves with the rods that touch it."""
+    tracks = rods.tracks
     followed = np.repeat(ends[None], tracks.frame_count, axis=0)
     for k in range(1, len(followed)):
         before = followed[k - 1]
-        rows, gap = rods_near(tracks, k - 1, before)
-        rows = rows[(np.abs(gap) < NEARLY * touch_width(tracks)) & tracks.present_in(k)[rows]]
-        followed[k] = before if len(rows) < FEWEST else before + _motion(tracks, k, rows, before)
+        rows, gap = rods.near(k - 1, before)
+        rows = rows[(np.abs(gap) < NEARLY * rods.width) & tracks.present_in(k)[rows]]
+        followed[k] = before if len(rows) < FEWEST else before + _motion(rods, k, rows, before)
     return followed
 
 
-def _motion(tracks: Tracks, k: int, rows: NDArray[np.intp], ends: Array) -> Array:
+def _motion(rods: RodsAtWalls, k: int, rows: NDArray[np.intp], ends: Array) -> Array:
     """Motion (2, 2) [m] of the ends (2, 2) of a wall to photograph k, with some rods (m,)."""
+    tracks, gap = rods.tracks, rods.gaps(k, rows, ends)
     normal, length = outward_normals(ends), float(np.linalg.norm(ends[1] - ends[0]))
     along = (ends[1] - ends[0]) / length
-    gap = distance_from_walls(ends, None, tracks.position[k, rows]) - tracks.radius[rows]
     place = (tracks.position[k, rows] - ends[0]) @ along / length
     middle, slope = float(np.median(gap)), 0.0
     if len(rows) >= FEWEST_TURNING and np.ptp(place) > SPREAD:
@@ -142,9 +145,9 @@ def _motion(tracks: Tracks, k: int, rows: NDArray[np.intp], ends: Array) -> Arra
     return slid * along - (middle + slope * np.array([[0.0], [1.0]])) * normal
 
 
-def _first_and_last_gap(tracks: Tracks, walls: WallTracks, w: int) -> tuple[float, float]:
+def _first_and_last_gap(rods: RodsAtWalls, walls: WallTracks, w: int) -> tuple[float, float]:
     """Gaps at wall w [m] in the first photograph and, by their median, in the last three; NaN without rods there."""
-    forward, back = (_known_gaps(tracks, walls, w, order) for order in (1, -1))
+    forward, back = (_known_gaps(rods, walls, w, order) for order in (1, -1))
     begin, end = list(islice(forward, 1)), list(islice(back, 3))
     return (begin[0], float(np.median(end))) if len(end) == 3 else (np.nan, np.nan)
 
@@ -159,15 +162,7 @@ def _moved_together(walls: WallTracks, changes: Mapping[int, float]) -> bool:
     return bool(np.abs(rest).max() < TOGETHER * np.abs(change).max())
 
 
-def _known_gaps(tracks: Tracks, walls: WallTracks, w: int, order: int) -> Iterator[float]:
+def _known_gaps(rods: RodsAtWalls, walls: WallTracks, w: int, order: int) -> Iterator[float]:
     """Gaps [m] of wall w in the photographs that show one, from the first (order 1) or from the last (−1)."""
-    gaps = (near_gap(tracks, walls, k, w) for k in range(tracks.frame_count)[::order])
+    gaps = (rods.nearest_gap(k, walls, w, NEAREST) for k in range(rods.tracks.frame_count)[::order])
     return (gap for gap in gaps if np.isfinite(gap))
-
-
-def near_gap(tracks: Tracks, walls: WallTracks, k: int, w: int, *, nearest: int = NEAREST) -> float:
-    """Gap [m] between a wall and one of the nearest rods beside it."""
-    rows, gap = rods_beside(tracks, k, walls.endpoints[k, w])
-    if not np.isnan(walls.endpoints[k]).any():
-        gap = gap[~behind_body(walls.endpoints[k], walls.sides, tracks.position[k, rows])[:, w]]
-    return float(np.sort(gap)[nearest - 1]) if len(gap) >= nearest else np.nan
