@@ -69,6 +69,7 @@ class PositionEstimates:
         self._shared = _shared_frames(snapshots, 1 if alone else alike)
         self._fringes: FringeCalibration | None = None
         self._known: dict[int, FramePosterior | None] = dict(given or {})
+        self._brief: dict[int, FramePosterior | None] = {}  # of the last frame that was compared
         self._single: dict[int, FramePosterior | None] = {}  # of the neighbours of a frame, without verdicts
 
     def at(self, k: int, verdicts: Verdicts = NO_VERDICTS) -> FramePosterior | None:
@@ -79,6 +80,13 @@ class PositionEstimates:
             # Only the last one is kept: a frame is requested again only while it is being solved.
             self._known = {k: self._smooth(k, verdicts) if self._alone else self._infer(k, verdicts)}
         return self._known[k]
+
+    def compared(self, k: int, verdicts: Verdicts = NO_VERDICTS) -> FramePosterior | None:
+        """Return a posterior of frame k from fewer draws, to be compared with forces from elsewhere."""
+        k = self.frame_of(k, verdicts)
+        if k not in self._brief:
+            self._brief = {k: self._infer(k, verdicts, brief=True)}
+        return self._brief[k]
 
     def frame_of(self, k: int, verdicts: Verdicts = NO_VERDICTS) -> int:
         """Return the frame whose positions serve frame k: with verdicts its own, else the first of those alike."""
@@ -101,7 +109,7 @@ class PositionEstimates:
             return None
         return smooth_forces([each for each in window.values() if each is not None], known.index(k), verdicts.forced)
 
-    def _infer(self, k: int, verdicts: Verdicts) -> FramePosterior | None:
+    def _infer(self, k: int, verdicts: Verdicts, *, brief: bool = False) -> FramePosterior | None:
         if self._evidence is None:
             try:
                 self._evidence = gather_position_evidence(
@@ -114,7 +122,8 @@ class PositionEstimates:
         if evidence.contacts.count == 0:
             return None
         infer = infer_alone if self._alone else infer_frame
-        return infer(evidence, self._evidence.settings, frame_generator(k), self._workers)
+        settings = self._evidence.settings.for_comparison() if brief else self._evidence.settings
+        return infer(evidence, settings, frame_generator(k), self._workers)
 
 
 def infer_alone(

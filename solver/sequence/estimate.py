@@ -41,6 +41,7 @@ NEGLIGIBLE_KAPPA = 1e-5  # below it the measured motion does not influence the f
 # A frame is steady where so much is expected of it; agreements then hold for so many frames.
 STEADY = 0.97
 STEADY_FRAMES = 4
+FULL_WEIGHT = 0.4  # of the position-only estimate, from which on its draws are not shortened
 MIN_OF_HULL = 3  # points that a convex hull needs more than
 WIDER = 1.5  # threshold of the second attempt at a suspect frame
 
@@ -129,6 +130,7 @@ def _combine(
     """Compare the motion estimate of hard grains with the position-only estimate; mix both as the evidence weighs them.
 
     In steady frames the agreements of the last few frames hold: the position-only estimate takes as long as the frame.
+    Fewer draws of it suffice unless its forces count much.
     """
     before = state.evidence
     if not np.isnan(before.agreement) and before.agreement_age + 1 < STEADY_FRAMES:
@@ -136,13 +138,16 @@ def _combine(
         weight = evident_position_weight(carried)
         if weight < LEAST_WEIGHT and expect_correlation(carried) > STEADY and before.position_weight == 0.0:
             return alone, carried
-    posterior = positions.at(problem.k, problem.verdicts)
-    if posterior is None or not posterior.fn.any():
-        return alone, evidence
-    evidence = _with_agreements(problem, evidence, alone, posterior)
-    weight = evident_position_weight(evidence)
-    if weight < LEAST_WEIGHT:
-        return alone, evidence
+    for estimate in (positions.compared, positions.at)[before.position_weight >= FULL_WEIGHT :]:
+        posterior = estimate(problem.k, problem.verdicts)
+        if posterior is None or not posterior.fn.any():
+            return alone, evidence
+        evidence = _with_agreements(problem, evidence, alone, posterior)
+        weight = evident_position_weight(evidence)
+        if weight < LEAST_WEIGHT:
+            return alone, evidence
+        if weight < FULL_WEIGHT:
+            break
     mixed = _mix(problem, alone, posterior, motion_reliability(evidence), position_weight=weight)
     return mixed, _evidence_of_mixture(problem, mixed, evidence, state)
 
