@@ -138,16 +138,18 @@ def _combine(
         weight = evident_position_weight(carried)
         if weight < LEAST_WEIGHT and expect_correlation(carried) > STEADY and before.position_weight == 0.0:
             return alone, carried
-    for estimate in (positions.compared, positions.at)[before.position_weight >= FULL_WEIGHT :]:
-        posterior = estimate(problem.k, problem.verdicts)
-        if posterior is None or not posterior.fn.any():
-            return alone, evidence
-        evidence = _with_agreements(problem, evidence, alone, posterior)
-        weight = evident_position_weight(evidence)
-        if weight < LEAST_WEIGHT:
-            return alone, evidence
-        if weight < FULL_WEIGHT:
-            break
+    brief = before.position_weight < FULL_WEIGHT
+    posterior = (positions.compared if brief else positions.at)(problem.k, problem.verdicts)
+    if posterior is None or not posterior.fn.any():
+        return alone, evidence
+    evidence = _with_agreements(problem, evidence, alone, posterior)
+    if brief and evident_position_weight(evidence) >= FULL_WEIGHT:
+        full = positions.at(problem.k, problem.verdicts)
+        assert full is not None  # of the same pairs
+        posterior, evidence = full, _with_agreements(problem, evidence, alone, full)
+    weight = evident_position_weight(evidence)
+    if weight < LEAST_WEIGHT:
+        return alone, evidence
     mixed = _mix(problem, alone, posterior, motion_reliability(evidence), position_weight=weight)
     return mixed, _evidence_of_mixture(problem, mixed, evidence, state)
 

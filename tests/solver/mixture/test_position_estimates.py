@@ -37,6 +37,17 @@ def test_estimate_does_not_depend_on_the_order_of_requests(soft) -> None:
     assert np.array_equal(first.fn, second.fn)
 
 
+def test_fewer_draws_are_compared_whatever_is_known(soft) -> None:
+    one, two = (PositionEstimates(soft.packing, soft.snapshots, SWEEPS, alike=2) for _ in range(2))
+    full = one.at(2)
+    brief, again = one.compared(3), two.compared(2)  # photographs alike
+    assert full is not None
+    assert brief is not None
+    assert again is not None
+    assert np.array_equal(brief.fn, again.fn)
+    assert 0.97 < np.corrcoef(full.fn, brief.fn)[0, 1] < 1.0
+
+
 def test_forces_of_positions_alone_are_nearer_to_balance_and_no_more_certain(soft) -> None:
     beside, alone = (
         PositionEstimates(soft.packing, soft.snapshots, SWEEPS, alone=each).at(2) for each in (False, True)
