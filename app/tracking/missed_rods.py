@@ -19,10 +19,11 @@ from ..experiment.photographs import Photographs
 from ..experiment.pictures.image import Image, ImageSelection
 from ..experiment.plausibility import rim_points
 from ..solver.bodies.grains import Array
-from ..solver.boundary.size_classes import group_readings
+from ..solver.boundary.size_classes import find_common_sizes
 from ..solver.even_subset import even_subset
 from ..solver.robust_scale import SD_OVER_MAD
-from .detection.detect import Detection, DetectionSettings, MissedGrainSearch, detect_grains
+from .detection.detect import TOUCHING, Detection, DetectionSettings, MissedGrainSearch, detect_grains
+from .detection.rings import not_overlapping
 
 SMALLEST = 0.05  # quantile of the radii below which nothing is looked for
 FITS = 0.85  # of the smallest radius: a place so wide may hold a rod that others hide in part
@@ -52,33 +53,45 @@ def detect_rods(image: Image, settings: DetectionSettings | None = None) -> Dete
     -----
     Near places that look like rods, circles of the known sizes are searched for once more at full resolution: on a
     shrunk copy coarse paint hides the rims. They must pass the tests of all others and look like rods. Where radii are
-    unknown, the sizes are those of the rods that were found; without distinct sizes nothing is added.
+    unknown, the sizes are those of nearly all rods that were found; without distinct sizes nothing is added. Circles of
+    other sizes may be paint: those that a rod of these sizes covers are left out.
     """
     settings = settings if settings is not None else DetectionSettings()
     found = detect_grains(image, settings)
     search: MissedGrainSearch | None = None
-    radii = np.array(settings.radii) if settings.radii else _sizes(found.radius)
-    if radii is None:
+    radii, odd = _sizes(found.radius, settings)
+    if len(radii) == 0:
         return found
+    found, others = found.select(~odd), found.select(odd)
     for _ in range(ROUNDS):
         places = find_missed_rods(image, found.x, found.y, found.radius)
         if len(places) == 0:
             break
         search = MissedGrainSearch(image, radii, settings) if search is None else search
         new = search.find_near(found, places[:, :2])
-        looks = _looks_of(image, np.column_stack([found.x, found.y, found.radius]))
+        looks = _looks_of(image, _circles(found))
         assert looks is not None  # of too few rods there are no places
-        new = new.select(_are_alike(image, np.column_stack([new.x, new.y, new.radius]), INSIDE, looks))
+        new = new.select(_are_alike(image, _circles(new), INSIDE, looks))
         if new.count == 0:
             break
         found = found.join(new)
-    return found
+    return found.join(others.select(_beside(_circles(others), _circles(found))))
 
 
-def _sizes(radius: Array) -> Array | None:
-    """Return the mean radius of every size (k,); None without distinct sizes."""
-    size_class = group_readings(radius)
-    return None if size_class is None else np.bincount(size_class, radius) / np.bincount(size_class)
+def _circles(found: Detection) -> Array:
+    return np.column_stack([found.x, found.y, found.radius])
+
+
+def _beside(circles: Array, found: Array) -> NDArray[np.bool_]:
+    """Mark the circles (n, 3) that overlap none of those found (c, 3) by more than touching ones."""
+    return not_overlapping(circles, found, np.full_like(circles, np.nan), allowed=TOUCHING)
+
+
+def _sizes(radius: Array, settings: DetectionSettings) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the sizes (k,), none without distinct ones, and the rods (n,) of another size, which may be paint."""
+    common = (np.array(settings.radii), np.zeros(len(radius), np.bool_)) if settings.radii else None
+    common = find_common_sizes(radius) if common is None else common
+    return (np.empty(0), np.zeros(len(radius), np.bool_)) if common is None else common
 
 
 def describe_missed_rods(experiment: Experiment, rods: GrainGuess) -> list[str]:

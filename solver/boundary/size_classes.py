@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from numpy.typing import NDArray
 
 from ..bodies.grains import Array
 from ..even_subset import even_subset
@@ -20,6 +21,7 @@ MIN_GAP, MAX_RANGE = 0.1, 0.12  # over the mean radius: between sizes, and of th
 MAX_SIZES, MIN_GRAINS = 4, 10
 # Fraction of the grains, and distance over the mean radius: fewer grains so near a size are misread, not a size.
 RARE, NEAR_SIZE = 0.02, 0.14
+COMMON = 0.9  # fraction of the grains that have one of the common sizes
 MOST_FRAMES = 8  # of which gaps are read, evenly over the sequence
 FEWEST_PAIRS = 50  # in a frame
 SIGNIFICANT = 5.0  # standard errors
@@ -57,9 +59,7 @@ def group_readings(radius: Float[Array, " n"]) -> Int[np.ndarray, " n"] | None:
     """
     if len(radius) < MIN_GRAINS:
         return None
-    order = np.argsort(radius, kind="stable")
-    boundaries = np.flatnonzero(np.diff(radius[order]) > MIN_GAP * radius.mean())
-    groups = np.split(order, boundaries + 1)
+    groups = _split(radius)
     common = [group for group in groups if len(group) >= RARE * len(radius)]
     sizes = np.array([radius[group].mean() for group in common])
     rare = [group for group in groups if len(group) < RARE * len(radius)]
@@ -75,6 +75,31 @@ def group_readings(radius: Float[Array, " n"]) -> Int[np.ndarray, " n"] | None:
     sizes = np.array([radius[group].mean() for group in groups])
     size_class[misread] = np.abs(radius[misread, None] - sizes).argmin(axis=1)
     return size_class
+
+
+def find_common_sizes(radius: Float[Array, " n"]) -> tuple[Float[Array, " q"], Bool[np.ndarray, " n"]] | None:
+    """Find the sizes of nearly all grains, and the grains of none of them; None where there are no distinct sizes.
+
+    Notes
+    -----
+    Groups as of `group_readings` that have at least 2 % of the grains and a range of at most 0.12 of their mean, at
+    most four of them, with at least 0.9 of all grains together.
+    """
+    if len(radius) < MIN_GRAINS:
+        return None
+    sizes, other = [], np.ones(len(radius), np.bool_)
+    for group in _split(radius):
+        mean = float(radius[group].mean())
+        if len(group) >= RARE * len(radius) and np.ptp(radius[group]) <= MAX_RANGE * mean:
+            sizes.append(mean)
+            other[group] = False
+    return (np.array(sizes), other) if len(sizes) <= MAX_SIZES and other.mean() <= 1.0 - COMMON else None
+
+
+def _split(radius: Array) -> list[NDArray[np.intp]]:
+    """Groups of readings, ascending, that are separated by more than MIN_GAP."""
+    order = np.argsort(radius, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(radius[order]) > MIN_GAP * radius.mean()) + 1)
 
 
 def find_size_classes(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -10,6 +12,8 @@ from rodsight.tracking.detection.detect import Detection, DetectionSettings, det
 from rodsight.tracking.missed_rods import MOST, describe_missed_rods, detect_rods, find_missed_rods
 from scipy.ndimage import gaussian_filter
 from scipy.spatial import KDTree
+
+from tests.app.tracking.speckled import grid_of_rods
 
 RADIUS, SMALLER, SIDE = 20.0, 19.5, 10
 MISSED, HOLES = [23, 57, 61], [34, 76]
@@ -166,3 +170,16 @@ def test_rods_without_distinct_sizes_are_left_as_they_are(monkeypatch: pytest.Mo
     assert len(find_missed_rods(image, given.x, given.y, given.radius)) > 0
     assert detect_rods(image) is given
     assert detect_rods(image, DetectionSettings((RADIUS,))).count > len(x)  # stated sizes are known
+
+
+def test_rods_whose_paint_hides_their_rims_take_the_place_of_the_circles_in_it() -> None:
+    rods = grid_of_rods(16, 16, radius=15.0, pitch=31.25, margin=37.5)
+    x, y, radius = rods.x.copy(), rods.y.copy(), rods.radius.copy()
+    radius[100] = 11.0  # of a size of its own, and no paint
+    image = replace(rods, radius=radius).reference()
+    first, found = detect_grains(image), detect_rods(image)
+    assert (np.abs(first.radius - 15.0) > 2.0).sum() > 3
+    assert found.count == rods.count
+    away, nearest = KDTree(np.column_stack([x, y])).query(np.column_stack([found.x, found.y]))
+    assert away.max() < 1.0
+    assert found.radius == pytest.approx(radius[nearest], abs=1.0)

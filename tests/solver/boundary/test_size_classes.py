@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rodsight.solver.boundary.size_classes import find_size_classes, group_readings
+from rodsight.solver.boundary.size_classes import find_common_sizes, find_size_classes, group_readings
 
 pytestmark = pytest.mark.unit
 
@@ -71,3 +71,15 @@ def test_few_readings_between_sizes_belong_to_the_nearest_size() -> None:
     found = group_readings(radius)
     assert found is not None
     assert np.bincount(found).tolist() == [304, 300, 3]
+
+
+def test_common_sizes_leave_out_grains_of_other_sizes() -> None:
+    radius = np.concatenate([np.full(150, 4.4e-3), np.full(150, 5.5e-3), np.linspace(1e-3, 3e-3, 20)])
+    found = find_common_sizes(radius)
+    assert found is not None
+    sizes, other = found
+    assert sizes == pytest.approx([4.4e-3, 5.5e-3])
+    assert np.array_equal(np.flatnonzero(other), np.arange(300, 320))
+    assert find_common_sizes(np.append(radius, np.linspace(1e-3, 3e-3, 20))) is None  # too many of other sizes
+    assert find_common_sizes(np.repeat([1.0, 2.0, 3.0, 4.0, 5.0], 20)) is None  # and too many sizes
+    assert find_common_sizes(radius[:5]) is None
