@@ -7,6 +7,7 @@ ground, the two cannot be distinguished.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from ..solver.bodies.grains import Array
 from ..solver.boundary.size_classes import find_common_sizes
 from ..solver.even_subset import even_subset
 from ..solver.robust_scale import SD_OVER_MAD
-from .detection.detect import TOUCHING, Detection, DetectionSettings, MissedGrainSearch, detect_grains
+from .detection.detect import MIN_RADIUS, TOUCHING, Detection, DetectionSettings, MissedGrainSearch, detect_grains
 from .detection.rings import not_overlapping
 
 SMALLEST = 0.05  # quantile of the radii below which nothing is looked for
@@ -37,6 +38,12 @@ ALIKE = 4.0  # robust standard deviations of brightness and contrast within whic
 LEAST_SD = np.array([3.0, 0.1])  # of brightness [grey] and of the logarithm of the contrast
 UNDECIDED = 0.5  # fraction of the pores that look like rods beyond which nothing is reported
 FEWEST = 5  # rods, and pores
+# Parts of the area of all circles that the smallest ones may have, fraction of a radius below which circles are smaller
+# than the others, and their least number over that of all: dots of paint in rods that were missed are many, but small.
+SMALL_AREA, SMALLER, MANY = (0.3, 0.15, 0.05), 0.85, 0.02
+# Standard deviation within circles over the contrast of the photograph, below which they are plain; of so many of them.
+PLAIN, LOOKED_AT = 0.1, 200
+LARGER = 1.5  # greatest radius that is looked for instead, over the largest found
 ROUNDS = 8  # of the search: every rod that is found shows the places beside it better
 
 
@@ -51,13 +58,18 @@ def detect_rods(image: Image, settings: DetectionSettings | None = None) -> Dete
 
     Notes
     -----
+    Where radii are unknown and many circles are small, as dots of coarse paint, larger ones are looked for as well: of
+    both detections the one counts that covers more area.
+
     Near places that look like rods, circles of the known sizes are searched for once more at full resolution: on a
-    shrunk copy coarse paint hides the rims. They must pass the tests of all others and look like rods. Where radii are
-    unknown, the sizes are those of nearly all rods that were found; without distinct sizes nothing is added. Circles of
-    other sizes may be paint: those that a rod of these sizes covers are left out.
+    shrunk copy coarse paint hides the rims. They must pass the tests of all others and look like rods. Unknown sizes
+    are those of nearly all rods that were found; without distinct sizes nothing is added. Circles of other sizes may
+    be paint: those that a rod of these sizes covers are left out.
     """
     settings = settings if settings is not None else DetectionSettings()
     found = detect_grains(image, settings)
+    if not settings.radii and settings.radius_range is None and not _are_plain(image, found):
+        found = _prefer_larger(image, found, settings)
     search: MissedGrainSearch | None = None
     radii, odd = _sizes(found.radius, settings)
     if len(radii) == 0:
@@ -76,6 +88,37 @@ def detect_rods(image: Image, settings: DetectionSettings | None = None) -> Dete
             break
         found = found.join(new)
     return found.join(others.select(_beside(_circles(others), _circles(found))))
+
+
+def _are_plain(image: Image, found: Detection) -> bool:
+    """Whether the circles bear no paint, which could look like circles itself."""
+    look = _appearance(image, _circles(found)[even_subset(found.count, LOOKED_AT)], INSIDE)[:, 1]
+    dark, bright = np.percentile(image, [3.0, 95.0])
+    return bool(np.nanmedian(np.append(np.expm1(look), np.inf)) < PLAIN * (bright - dark)) if found.count else True
+
+
+def _prefer_larger(image: Image, found: Detection, settings: DetectionSettings) -> Detection:
+    """Detect again without the small circles as long as the others then cover more area: the small ones were paint."""
+    for _ in range(ROUNDS):
+        larger = _find_larger(image, found, settings)
+        if larger is None:
+            break
+        found = larger
+    return found
+
+
+def _find_larger(image: Image, found: Detection, settings: DetectionSettings) -> Detection | None:
+    """Detect without circles that have some part of the area; None: no part without which the others cover more."""
+    radius = np.sort(found.radius)
+    area = np.cumsum(radius**2)
+    parts = SMALL_AREA if len(radius) >= FEWEST else ()
+    smallest = [SMALLER * float(radius[np.searchsorted(area, part * area[-1])]) for part in parts]
+    for least in dict.fromkeys(smallest):
+        if least > MIN_RADIUS and (radius < least).mean() >= MANY:
+            larger = detect_grains(image, replace(settings, radius_range=(least, LARGER * float(radius[-1]))))
+            if float(np.sum(larger.radius**2)) > area[-1]:
+                return larger
+    return None
 
 
 def _circles(found: Detection) -> Array:

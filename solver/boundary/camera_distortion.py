@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..bodies.grains import Array
 from ..even_subset import even_subset
 from ..quantity import Quantity
-from .touching_pairs import TouchingFit, count_classes, find_near_pairs, fit_touching_pairs
+from .touching_pairs import TouchingFit, count_classes, find_near_pairs, fit_touching_pairs, place_dependence
 
 MOST_FRAMES = 8  # of which gaps are read, evenly over the sequence …
 MOST_POSES, FEWEST_FRAMES = 20_000, 2  # … and poses in them: more show the same distortion; frames at least
@@ -36,8 +36,8 @@ MAX_OVERLAP = 2.5  # mean overlap over the scatter of touching gaps, above which
 # Mean overlap of soft grains over the scatter s of their touching gaps: 1 − 1.6 σ/s, with σ the noise of a position, is
 # near the one at which r is largest in nine simulated packings with radii read too small (.8 at σ/s = .2, .3 at .45).
 OVERLAP_OF_NOISE = 1.6
-SECTORS, RINGS = 8, 3  # parts of the picture in which gaps are compared
-UNEXPLAINED = 1.0  # robust standard deviations of a touching gap: range of the usual one over the parts of the picture
+# In a crystal a stretching fits whatever its few directions have, so that more must be explained.
+CRYSTAL, EXPLAINED_IN_CRYSTAL = 0.5, 0.8  # order of the directions of pairs; as EXPLAINED
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,11 +212,12 @@ def find_camera_distortion(
     -----
     Weighted least squares of g + n·(u(x_j) − u(x_i)) − δ_i − δ_j = 0 over pairs, with u the displacement of
     `CameraDistortion` and δ the error of a class's radius, see `fit_touching_pairs`. A model with more unknowns is
-    applied where it reduces the robust scatter of all pairs to 0.95 of that of a simpler one, if one of its unknowns
-    exceeds five standard errors. Forces of soft grains depend on direction and place, too, but do not change the
-    scatter of their gaps so much. A lens that is found gets higher orders and another middle where these raise the
-    likelihood of the gaps in the other frames by two standard errors. A gradient of the gaps of soft grains across the
-    picture is a perspective if it exceeds its standard error: balance allows no gradient of the mean pressure.
+    applied where it reduces the robust scatter of all pairs to 0.95 of that of a simpler one, in a crystal 0.8, if one
+    of its unknowns exceeds five standard errors. Forces of soft grains depend on direction and place, too: who knows
+    their overlaps must compare the change of gaps with them. A lens that is found gets higher orders and another middle
+    where these raise the likelihood of the gaps in the other frames by two standard errors. A gradient of the gaps of
+    soft grains across the picture is a perspective if it exceeds its standard error: without gravity, balance allows no
+    gradient of the mean pressure.
     """
     present = position[np.isfinite(position[..., 0])]
     if not len(present):
@@ -232,10 +233,11 @@ def find_camera_distortion(
         return None
     none = _fit(pairs, (), reading.diameter)
     best, chosen = none, ()
+    explained = EXPLAINED_IN_CRYSTAL if _direction_order(pairs) > CRYSTAL else EXPLAINED
     for unknowns in MODELS:
         found = _fit(pairs, unknowns, reading.diameter)
         significant = np.abs(found.value[list(unknowns)]) > SIGNIFICANT * found.sd[list(unknowns)]
-        if significant.any() and found.misfit < EXPLAINED * best.misfit:
+        if significant.any() and found.misfit < explained * best.misfit:
             best, chosen = found, unknowns
     if set(chosen) & set(range(UNKNOWNS)[RADIAL]):
         pairs, best, chosen = _extend(reading, pairs, best, chosen, soft)
@@ -245,9 +247,15 @@ def find_camera_distortion(
     size = np.bincount(size_class, radius) / np.bincount(size_class)
     return CameraDistortion(
         value, best.sd[:UNKNOWNS], float(pairs.shrinking @ value), middle, reading.half_width, none.misfit, best.misfit,
-        bool(chosen), _place_dependence(pairs, best, reading.diameter), best.value[UNKNOWNS:], best.scatter,
-        best.sd[UNKNOWNS:], size, np.ones(len(size)),
+        bool(chosen), place_dependence(best, pairs.middle, reading.diameter, pairs.frames), best.value[UNKNOWNS:],
+        best.scatter, best.sd[UNKNOWNS:], size, np.ones(len(size)),
     )  # fmt: skip
+
+
+def _direction_order(pairs: _Pairs) -> float:
+    """Greater of |⟨exp(i m φ)⟩|, m = 4 and 6, over the directions φ of the pairs: 1 in a crystal, 0 without order."""
+    twice = np.arctan2(pairs.design[:, 1], pairs.design[:, 0])  # a stretching along x and one along the diagonal
+    return max(float(np.abs(np.exp(1j * half * twice).mean())) for half in (2, 3))
 
 
 @dataclass(frozen=True, slots=True)
@@ -378,22 +386,3 @@ def _fit(pairs: _Pairs, unknowns: tuple[int, ...], diameter: float, start: Touch
     value, sd = np.zeros(count), np.zeros(count)
     value[used], sd[used] = found.value, found.sd
     return replace(found, value=value, sd=sd)
-
-
-def _place_dependence(pairs: _Pairs, fit: TouchingFit, diameter: float) -> float:
-    """Compute the range of the usual touching gap over the picture [m]; 0 where it is within scatter and error."""
-    x, y = pairs.middle.T
-    ring = np.minimum((np.hypot(x, y) * RINGS).astype(int), RINGS - 1)
-    part = ring * SECTORS + ((np.arctan2(y, x) / (2.0 * np.pi) + 0.5) * SECTORS).astype(int) % SECTORS
-    usual, error = [], []
-    for number in np.unique(part):
-        gap = fit.residual[part == number]
-        if len(gap) < FEWEST_PAIRS:
-            continue
-        local = fit_touching_pairs(gap, np.full((len(gap), 1), -1.0), np.array([False]), diameter, pairs.frames)
-        usual.append(local.value[0])
-        error.append(local.sd[0])
-    if len(usual) < 2:
-        return 0.0
-    spread = float(np.ptp(usual))
-    return spread if spread > max(UNEXPLAINED * fit.scatter, SIGNIFICANT * float(max(error))) else 0.0

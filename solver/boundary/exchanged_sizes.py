@@ -19,6 +19,7 @@ INSIDE = 3.0  # touching neighbours that outweigh one inside which the grain lie
 # Touching neighbours per photograph by which a lesser and a greater size must be better: a loose grain touches none,
 # and by chance the hole that it is in may have the size of a greater one.
 LESSER, GREATER = 1.5, 2.5
+FEWEST = 1.5  # touching neighbours per photograph with the right size: nothing shows that of a loose grain
 ALIKE = 0.5  # difference of two scores that shows no size
 USUAL, HARD = 0.98, 0.5  # quantile of the overlaps of other grains, and its limit over that of a touching pair
 TIGHT = 0.1  # of a touching pair: median overlap of a grain with its neighbours that is tolerated whatever others have
@@ -68,6 +69,7 @@ def find_exchanged_sizes(
         Radii [m]; the stated ones where no other size is clearly better. All stay as stated where more than MOST would
         change, or where the other grains overlap so much that an overlap shows no size. A loose grain in a hole that is
         a little too small for a greater size stays as stated, too: it would overlap its neighbours more than others do.
+        So does one that would touch fewer than 1.5 neighbours per photograph.
 
     Notes
     -----
@@ -102,6 +104,8 @@ def find_exchanged_sizes(
             break
         found[change] = sizes[best[change]]
     exchanged = np.abs(found - radius) > touch
+    # A grain whose whole class is stated too large lies inside its neighbours, too: much smaller, it touches none.
+    exchanged &= _score(pairs, found, np.append(found, of_walls), touch) / frames >= FEWEST
     if not exchanged.any():
         return radius
     pairs = pairs.select(pairs.other < len(radius))

@@ -18,6 +18,10 @@ FIRST_WIDTH, SHRINK, LAST_WIDTH = 0.12, 0.75, 1.5  # mean diameters; factor of a
 NEAR_WIDTH = 0.04  # mean diameters: where the solution is nearly known
 ROUNDS = 30
 CONVERGED = 1e-3  # scatters: change of a residual in a round
+SECTORS, RINGS = 8, 3  # parts of the picture in which gaps are compared …
+FEWEST_OF_PART = 100  # … with so many pairs
+UNEXPLAINED = 1.0  # robust standard deviations of a touching gap: range of the usual one over the parts of the picture
+SIGNIFICANT = 5.0  # standard errors of it
 NARROWEST = 1e-6  # mean diameters: width for gaps without any error
 
 
@@ -120,3 +124,34 @@ def fit_touching_pairs(
     return TouchingFit(
         np.asarray(value, np.float64), sd, scatter, SD_OVER_MAD * float(np.median(np.abs(residual))), residual, weight
     )
+
+
+def place_dependence(fit: TouchingFit, place: Float[Array, "m 2"], diameter: float, frames: int) -> float:
+    """Compute the range of the usual touching gap over the picture [m]; 0 where it is within scatter and error.
+
+    Parameters
+    ----------
+    fit : TouchingFit
+        Of the pairs.
+    place : (m, 2)
+        Their places from the middle of the picture, over its half-width.
+    diameter : float
+        Mean diameter [m].
+    frames : int
+        Photographs that the pairs were read from.
+    """
+    x, y = place.T
+    ring = np.minimum((np.hypot(x, y) * RINGS).astype(int), RINGS - 1)
+    part = ring * SECTORS + ((np.arctan2(y, x) / (2.0 * np.pi) + 0.5) * SECTORS).astype(int) % SECTORS
+    usual, error = [], []
+    for number in np.unique(part):
+        gap = fit.residual[part == number]
+        if len(gap) < FEWEST_OF_PART:
+            continue
+        local = fit_touching_pairs(gap, np.full((len(gap), 1), -1.0), np.array([False]), diameter, frames)
+        usual.append(local.value[0])
+        error.append(local.sd[0])
+    if len(usual) < 2:
+        return 0.0
+    spread = float(np.ptp(usual))
+    return spread if spread > max(UNEXPLAINED * fit.scatter, SIGNIFICANT * float(max(error))) else 0.0

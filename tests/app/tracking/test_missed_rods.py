@@ -183,3 +183,14 @@ def test_rods_whose_paint_hides_their_rims_take_the_place_of_the_circles_in_it()
     away, nearest = KDTree(np.column_stack([x, y])).query(np.column_stack([found.x, found.y]))
     assert away.max() < 1.0
     assert found.radius == pytest.approx(radius[nearest], abs=1.0)
+
+
+def test_dots_of_black_paint_are_no_rods() -> None:
+    rods = grid_of_rods(8, 8, radius=36.0, pitch=75.0, margin=90.0, black=20.0)
+    image = rods.reference()
+    first, found = detect_grains(image), detect_rods(image)
+    assert (first.radius < 20.0).sum() > 20
+    assert found.count == rods.count
+    away, _ = KDTree(np.column_stack([rods.x, rods.y])).query(np.column_stack([found.x, found.y]))
+    assert away.max() < 1.0
+    assert len(detect_rods(np.full_like(image, 20.0)).x) == 0

@@ -86,6 +86,8 @@ MUTANTS = [
         ("return places[_are_alike(image, places, INSIDE, looks)]", "return places"),
         ("new = new.select(_are_alike(", "new.select(_are_alike("),
         ("if settings.radii else None", "if False else None"),
+        ("        found = larger\n", "        break\n"),
+        ("if float(np.sum(larger.radius**2)) > area[-1]:", "if False:"),
         ("return found.join(others.select(_beside(_circles(others), _circles(found))))", "return found.join(others)"),
         ("return found.join(others.select(_beside(_circles(others), _circles(found))))", "return found"),
         ("ROUNDS = 8", "ROUNDS = 0"),
