@@ -19,7 +19,7 @@ INSIDE = 3.0  # touching neighbours that outweigh one inside which the grain lie
 # Touching neighbours per photograph by which a lesser and a greater size must be better: a loose grain touches none,
 # and by chance the hole that it is in may have the size of a greater one.
 LESSER, GREATER = 1.5, 2.5
-FEWEST = 1.5  # touching neighbours per photograph with the right size: nothing shows that of a loose grain
+FEWEST = 1.5  # touching neighbours per photograph of a grain that is not loose
 ALIKE = 0.5  # difference of two scores that shows no size
 USUAL, HARD = 0.98, 0.5  # quantile of the overlaps of other grains, and its limit over that of a touching pair
 TIGHT = 0.1  # of a touching pair: median overlap of a grain with its neighbours that is tolerated whatever others have
@@ -69,7 +69,8 @@ def find_exchanged_sizes(
         Radii [m]; the stated ones where no other size is clearly better. All stay as stated where more than MOST would
         change, or where the other grains overlap so much that an overlap shows no size. A loose grain in a hole that is
         a little too small for a greater size stays as stated, too: it would overlap its neighbours more than others do.
-        So does one that would touch fewer than 1.5 neighbours per photograph.
+        So does one that would touch fewer than 1.5 neighbours per photograph, and stand farther from all than it lies
+        inside one as stated.
 
     Notes
     -----
@@ -104,8 +105,10 @@ def find_exchanged_sizes(
             break
         found[change] = sizes[best[change]]
     exchanged = np.abs(found - radius) > touch
-    # A grain whose whole class is stated too large lies inside its neighbours, too: much smaller, it touches none.
-    exchanged &= _score(pairs, found, np.append(found, of_walls), touch) / frames >= FEWEST
+    # A grain whose whole class is stated too large lies inside its neighbours, too: much smaller, it is far from all.
+    stands = _score(pairs, found, np.append(found, of_walls), touch) / frames >= FEWEST
+    inside = -_least_gap(pairs, radius, np.append(radius, of_walls))
+    exchanged &= stands | (_least_gap(pairs, found, np.append(found, of_walls)) < inside)
     if not exchanged.any():
         return radius
     pairs = pairs.select(pairs.other < len(radius))
@@ -120,6 +123,13 @@ def find_exchanged_sizes(
         if len(its) and np.median(its) > max(usual, TIGHT * touch):
             exchanged[grain] = False
     return np.where(exchanged, found, radius)
+
+
+def _least_gap(pairs: _Pairs, own: Array, others: Array) -> Array:
+    """Least gap (n,) [m] of each grain of radius `own` (n,) among grains and walls of radii `others` (n + w,)."""
+    least = np.full(len(own), np.inf)
+    np.minimum.at(least, pairs.grain, pairs.distance - own[pairs.grain] - others[pairs.other])
+    return least
 
 
 def _mean_overlaps(pairs: _Pairs, radius: Array, touch: float) -> tuple[NDArray[np.int64], Array]:

@@ -89,6 +89,16 @@ def test_overlaps_that_are_larger_along_the_greatest_stress_are_no_stretching(gi
     assert (sentence, found) == ("", None)
 
 
+def test_overlaps_that_grow_with_depth_are_no_lens(given, monkeypatch) -> None:
+    tracks, walls = given
+    middle, width = tracks.position[0].mean(axis=0), 0.5 * float(np.ptp(tracks.position[0], axis=0).max())
+    seen = replace(tracks, position=through_lens(tracks.position, middle, width))
+    for overlap, removed in ((4e-4, False), (1e-5, True)):
+        monkeypatch.setattr(boundary, "find_soft_overlap", lambda *_, overlap=overlap: overlap)
+        _, _, sentence, found = correct_camera(MATERIAL, seen, walls, (), radii_known=True)
+        assert (found is not None, "lens" in sentence or "radial" in sentence) == (removed, removed)
+
+
 def test_radii_that_were_read_in_the_picture_are_adapted_instead_of_distances(given) -> None:
     tracks, walls = given
     seen = replace(tracks, position=stretched(tracks.position)), replace(walls, endpoints=stretched(walls.endpoints))

@@ -193,6 +193,8 @@ MUTANTS = [
         ("pairs = pairs.select(pairs.other < len(radius))", "pass"),
         ("touch = TOUCHING * float(np.diff(np.sort(sizes)).min())", "touch = float(np.diff(np.sort(sizes)).min())"),
         ("change &= gain >= rival", "pass"),
+        ("exchanged &= stands |", "exchanged |= stands &"),
+        ("exchanged &= stands |", "exchanged &= stands &"),
         ("pairs.grain[near] * len(radius) + pairs.other[near]", "np.arange(near.sum())"),
         ("if exchanged.mean() > MOST or not usual < HARD * touch:", "if exchanged.mean() > MOST:"),
         ("if exchanged.mean() > MOST or not usual < HARD * touch:", "if not usual < HARD * touch:"),

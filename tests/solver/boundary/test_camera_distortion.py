@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rodsight.solver.boundary import camera_distortion
 from rodsight.solver.boundary.camera_distortion import find_camera_distortion
 
 pytestmark = pytest.mark.unit
@@ -151,3 +152,17 @@ def test_a_lens_whose_axis_is_beside_the_middle_is_no_perspective() -> None:
     assert found.applied
     assert found.value[8:].all()
     assert not found.value[[0, 1, 6, 7]].any()  # unknowns that the picture does not have would only add their errors
+
+
+def test_in_a_crystal_a_stretching_must_explain_more(monkeypatch) -> None:
+    """Contacts that open across a compression change the gaps in one of three directions, as a stretching does."""
+    position, size_class = lattice()
+    seen, radius = distort(position, 0.0, 2e-3), np.full(position.shape[1], R)
+    found = find_camera_distortion(seen, radius, size_class)
+    assert found is not None
+    assert not found.applied
+    monkeypatch.setattr(camera_distortion, "CRYSTAL", 1.0)  # as without the order of its directions
+    found = find_camera_distortion(seen, radius, size_class)
+    assert found is not None
+    assert found.applied
+    assert found.explained > 0.8 * found.scatter

@@ -150,3 +150,13 @@ def test_rods_glued_side_by_side_show_no_sizes(packing) -> None:
     assert not np.array_equal(find_exchanged_sizes(glued, stated, sizes), stated)
     boundary = np.arange(len(stated)) >= len(radius)
     assert np.array_equal(find_exchanged_sizes(glued, stated, sizes, boundary=boundary), stated)
+
+
+def test_grains_of_a_class_that_is_stated_too_large_keep_their_sizes() -> None:
+    """Groups of three that lie inside each other: smaller, the middle one would lie inside none, but be far from all."""
+    x, y = np.meshgrid(np.arange(20.0), np.arange(20.0))
+    lattice = np.stack([x.ravel(), y.ravel()], axis=1)
+    groups = [0.012 * lattice[[0, 1, 20]] + [0.1 * number, 1.0] for number in range(10)]
+    position = np.repeat(np.concatenate([0.011 * lattice, *groups])[None], 3, axis=0)
+    stated = np.concatenate([np.full(400, 0.0055), np.full(30, 1.02 * 0.006)])
+    assert np.array_equal(find_exchanged_sizes(position, stated, (stated > 0.0055).astype(np.int64)), stated)
