@@ -14,9 +14,7 @@ from scipy.spatial import KDTree
 from ..bodies.grains import Array
 from .interpolated_poses import NEIGHBOURS, neighbour_rows
 
-FAR = (
-    0.5  # of the distance to the nearest grain: a grain that departs more from its expected place may have another name
-)
+FAR = 0.5  # of the distance to the nearest grain: a grain that is farther from its expected place may have another name
 NEAR = 0.25  # of that distance: a grain that stands nearer to the expected place of another may be that other
 # Of the least distance of two grains: motions that differ by less cannot bring one half of its distance astray.
 QUIET = 0.15
@@ -40,8 +38,9 @@ def find_exchanged_ids(position: Float[Array, "f n 2"]) -> Int[np.ndarray, "f n"
     -----
     A grain is expected where it was last, moved as the median of its neighbours since then. With d the distance from
     there to the nearest other grain, a grain that stands farther than d/2 from where it is expected, or that has no
-    pose, is given the pose of such another name within d/4. The names that are left over are given to the grains that
-    are left over, if these have no pose: a tracker that loses a grain may take the name of its neighbour for it.
+    pose, is given the pose of such another name within d/4; if it had no pose before, only that of a new name. The
+    names that are left over are given to the grains that are left over, if these have no pose: a tracker that loses a
+    grain may take the name of its neighbour for it.
     """
     frames, n = position.shape[:2]
     row = np.tile(np.arange(n), (frames, 1))
@@ -57,7 +56,7 @@ def find_exchanged_ids(position: Float[Array, "f n 2"]) -> Int[np.ndarray, "f n"
         moved = _continued(last, now)
         if moved is None:
             continue
-        _restore(row[k], moved, position[k])
+        _restore(row[k], moved, position[k], seen=np.isfinite(position[k - 1, row[k - 1], 0]))
         now = position[k][row[k]]
         last = np.where(np.isfinite(now), now, moved)
     return row
@@ -89,8 +88,8 @@ def _continued(last: Array, now: Array) -> Array | None:
     return expected
 
 
-def _restore(row: NDArray[np.int64], expected: Array, position: Array) -> None:
-    """Change the rows (n,) of grains that stand under the names of others."""
+def _restore(row: NDArray[np.int64], expected: Array, position: Array, *, seen: NDArray[np.bool_]) -> None:
+    """Change the rows (n,) of grains that stand under the names of others; seen (n,): in the photograph before."""
     placed = np.flatnonzero(np.isfinite(expected[:, 0]))
     distance = np.full(len(row), np.inf)
     distance[placed] = KDTree(expected[placed]).query(expected[placed], k=2)[0][:, 1]
@@ -103,7 +102,9 @@ def _restore(row: NDArray[np.int64], expected: Array, position: Array) -> None:
         return
     length, nearest = KDTree(now[posed]).query(expected[sought])
     taken = posed[nearest]  # of one grain at most: expected places are farther apart
-    fits = (length < NEAR * distance[sought]) & (taken != sought)
+    # Another grain may move to where one is not seen any more: later only a name that is new is the lost one's.
+    may_take = seen[sought] | np.isfinite(now[sought, 0]) | ~np.isfinite(expected[taken, 0])
+    fits = (length < NEAR * distance[sought]) & (taken != sought) & may_take
     while fits.any():
         one, other = sought[fits], taken[fits]
         # Who takes a name without giving its own away must have had no pose: its own goes to who gives without taking.

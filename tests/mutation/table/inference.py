@@ -49,6 +49,7 @@ MUTANTS = [
         ("length < NEAR * distance[sought]", "length < 9.0 * distance[sought]"),
         ("& np.isfinite(now[sought, 0]) & fits", "& False"),
         ("fits &= ~open_ended", "fits[:] = False"),
+        ("(taken != sought) & may_take", "(taken != sought)"),
         ("row[one] = former[other]", "row[one] = other"),
         ("row[np.setdiff1d(other, one)] = former[np.setdiff1d(one, other)]", "pass"),
         ("row[k] = row[k - 1]", "pass"),

@@ -153,7 +153,7 @@ def test_rods_glued_side_by_side_show_no_sizes(packing) -> None:
 
 
 def test_grains_of_a_class_that_is_stated_too_large_keep_their_sizes() -> None:
-    """Groups of three that lie inside each other: smaller, the middle one would lie inside none, but be far from all."""
+    """Groups of three inside each other: smaller, the middle one would lie inside none, but be far from all."""
     x, y = np.meshgrid(np.arange(20.0), np.arange(20.0))
     lattice = np.stack([x.ravel(), y.ravel()], axis=1)
     groups = [0.012 * lattice[[0, 1, 20]] + [0.1 * number, 1.0] for number in range(10)]

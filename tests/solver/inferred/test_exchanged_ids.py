@@ -66,6 +66,13 @@ def test_a_lost_grain_does_not_take_its_neighbour_with_it():
     assert np.array_equal(restored(given), true, equal_nan=True)
 
 
+def test_a_grain_that_moves_to_where_one_was_taken_out_keeps_its_name():
+    position = sheared()
+    position[START:, BESIDE] = np.nan
+    position[START + 1 :, ONE] = sheared()[START + 1 :, BESIDE]
+    assert np.array_equal(restored(position), position, equal_nan=True)
+
+
 def as_given(position):
     return (find_exchanged_ids(position) == np.arange(N)).all()
 
