@@ -209,8 +209,11 @@ MUTANTS = [
     *mutants_of(
         "app/inference/correction/tables/wall_places.py",
         f"{TESTS}/tables/test_wall_places.py",
-        ("    if not touched:", "    if False:"),
-        ("or not each.fraction(place) > MOST", ""),
+        ("or not each.fraction(place) > usual", ""),
+        ("usual = min(MOST, USUAL * min(touched.values()))", "usual = MOST"),
+        ("np.ptp(slope) < SAME_ANGLE *", "np.ptp(slope) < 99.0 *"),
+        ("inside).max() > most:", "inside).max() > 1.0:"),
+        ("if len(place) < FEWEST_WALLS or", "if len(place) < 1 or"),
         ("max(MORE * stated, FEWEST)", "FEWEST"),
         ("endpoints[:, w] -= ends", "endpoints[:, w] += ends"),
         ("np.array([-0.5, 0.5])", "np.array([0.5, -0.5])"),

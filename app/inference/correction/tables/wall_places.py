@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,12 +12,15 @@ from ....solver.bodies.grains import Array
 from ....solver.bodies.wall_shapes import outward_normals
 from ....tracks import Tracks, WallTracks
 from .rods_at_walls import RodsAtWalls
-from .wall_times import FEWEST, MORE, MOST
+from .wall_times import FEWEST, MORE, MORE_TOGETHER, MOST
 from .walls_at_rest import NEAREST
 
 BEFORE, BEHIND = 4.0, 8.0  # widths of touching before and behind the NEAREST rod, between which a wall is sought
 STEEPEST = 0.03  # slope of a wall against its stated direction
+USUAL = 0.7  # of the least fraction of near rods that touch another wall: as many touch a wall in its place
+FEWEST_WALLS, SAME_ANGLE = 3, 0.3  # walls that are turned by the same angle against the rods, within a part of it
 LOOSE = 3.0  # widths of touching with which its place is sought, before a robust line through the gaps (Theil and Sen)
+QUARTER_TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])  # of rows of vectors, anticlockwise
 STATED = (0.0, 0.0)  # place of a wall as it is stated
 
 
@@ -53,6 +57,8 @@ class _Gaps:
         _, distance, slope = max(found, key=lambda each: each[0])
         gap, along = np.concatenate(self.of_frames, axis=1)
         near = np.abs(gap - slope * along - distance) < loose
+        if near.sum() < FEWEST:
+            return None
         slope, distance = np.asarray(theilslopes(gap[near], along[near])[:2], dtype=np.float64).tolist()
         return distance, slope
 
@@ -84,25 +90,57 @@ def correct_wall_places(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, 
     -----
     Counted are rods of all photographs whose gap is within three standard deviations of a position of the same
     distance, or of the same line. Another wall must be touched as it is stated: wrong radii and a wrong scale move rods
-    away from all walls, or beyond all.
+    away from all walls, or beyond all. Where no wall is touched, but three or more are turned by the same angle against
+    the rods, all are moved as one, as of a camera that was turned.
     """
     rods = RodsAtWalls.of(tracks)
     gaps = {w: _measure(rods, walls, w) for w in walls.straight}
-    touched = {w for w, each in gaps.items() if each.fraction(STATED) > MOST}
+    touched = {w: each.fraction(STATED) for w, each in gaps.items() if each.fraction(STATED) > MOST}
     if not touched:
-        return walls, ""
+        return _move_together(walls, gaps, LOOSE * rods.width)
+    usual = min(MOST, USUAL * min(touched.values()))
     endpoints, words = walls.endpoints.copy(), []
     for w, each in gaps.items():
         place = None if w in touched else each.find_place()
         if place is None:
             continue
         there, stated = each.count(place), each.count(STATED)
-        if there < max(MORE * stated, FEWEST) or not each.fraction(place) > MOST:
+        if there < max(MORE * stated, FEWEST) or not each.fraction(place) > usual:
             continue
         ends = place[0] + place[1] * each.length * np.array([-0.5, 0.5])  # at the ends
         endpoints[:, w] -= ends[:, None] * outward_normals(walls.endpoints[:, w])[:, None]
         words.append(f"{_describe(walls.name[w], ends)}: {there} rods touch it in its right place, {stated} as stated")
     return (replace(walls, endpoints=endpoints), "; ".join(words)) if words else (walls, "")
+
+
+def _move_together(walls: WallTracks, gaps: Mapping[int, _Gaps], most: float) -> tuple[WallTracks, str]:
+    """Move all walls by the turn and shift that straight ones share against the rods, up to a distance `most` [m]."""
+    place = {w: found for w, each in gaps.items() if (found := _place_of_more(each)) is not None}
+    inside, slope = np.array(list(place.values())).reshape(-1, 2).T
+    if len(place) < FEWEST_WALLS or not np.ptp(slope) < SAME_ANGLE * abs(angle := float(np.median(slope))):
+        return walls, ""
+    ends = walls.endpoints[:, list(place)].mean(axis=0)
+    normal, middle = outward_normals(ends), ends.mean(axis=1)
+    centre = middle.mean(axis=0)
+    turned = angle * np.einsum("ij,ij->i", (middle - centre) @ QUARTER_TURN, normal)  # outwards
+    shift = np.linalg.lstsq(normal, -inside - turned)[0]
+    if np.abs(normal @ shift + turned + inside).max() > most:
+        return walls, ""
+    along, across = np.cos(angle), np.sin(angle)
+    turn = np.array([[along, across], [-across, along]])  # of points as rows
+    moved = centre + shift + (walls.endpoints - centre) @ turn
+    there, stated = sum(gaps[w].count(each) for w, each in place.items()), sum(gaps[w].count(STATED) for w in place)
+    return replace(walls, endpoints=moved), (
+        f"the walls are turned by {np.degrees(angle):.2g}° against the rods and shifted by "
+        f"{1e3 * float(np.linalg.norm(shift)):.2g} mm: {there} rods touch them in their right place, {stated} as stated"
+    )
+
+
+def _place_of_more(gaps: _Gaps) -> tuple[float, float] | None:
+    """Place of a wall at which many more rods touch it than as stated; None: there is none."""
+    place = gaps.find_place()
+    many = place is not None and gaps.count(place) >= max(MORE_TOGETHER * gaps.count(STATED), FEWEST)
+    return place if many else None
 
 
 def _describe(name: str, ends: Array) -> str:

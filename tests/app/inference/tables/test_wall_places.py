@@ -83,3 +83,50 @@ def test_a_wall_that_a_third_of_its_rods_touch_stays():
     radius = tracks.radius.copy()
     radius[N - 6 :] -= 5e-4  # six of ten rods seem apart from the wall
     assert correct_wall_places(replace(tracks, radius=radius), walls) == (walls, "")
+
+
+def four_walls():
+    """The same box with its sides."""
+    width = SIDE * PITCH
+    corner = np.array([[0.0, 0.0], [width, 0.0], [width, width], [0.0, width]])
+    ends = np.stack([corner, np.roll(corner, -1, axis=0)], axis=1)
+    names = ("bottom", "right", "top", "left")
+    return WallTracks(names, np.repeat(ends[None], FRAMES, axis=0), np.array([np.nan, np.nan, 5e4, np.nan]))
+
+
+def turned(points, degrees, shift):
+    angle, middle = np.radians(degrees), 0.5 * SIDE * PITCH
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    return middle + np.asarray(shift) + (points - middle) @ turn
+
+
+@pytest.mark.parametrize(("degrees", "shift"), [(0.5, 0.0), (-0.2, [1e-3, -2e-3]), (0.1, [0.0, 5e-4])])
+def test_walls_are_turned_together_as_by_a_camera(degrees, shift):
+    walls, tracks = four_walls(), rolling_tracks(step=0.0)
+    wrong = replace(walls, endpoints=turned(walls.endpoints, degrees, shift))
+    corrected, done = correct_wall_places(tracks, wrong)
+    assert float(re.search(r"turned by (\S+)°", done)[1]) == pytest.approx(-degrees, abs=0.01)
+    assert done.endswith("as stated")
+    np.testing.assert_allclose(corrected.endpoints, walls.endpoints, atol=5.0 * NOISE)
+
+
+def test_walls_that_are_not_turned_alike_are_not_moved_together():
+    walls, tracks = four_walls(), rolling_tracks(step=0.0)
+    wider = walls.endpoints + np.sign(walls.endpoints - 0.5 * SIDE * PITCH) * 1e-3  # apart from all rods
+    assert correct_wall_places(tracks, replace(walls, endpoints=wider))[1] == ""
+    apart = turned(wider, 0.5, 0.0)
+    assert correct_wall_places(tracks, replace(walls, endpoints=apart))[1] == ""
+    along, across = np.diff(walls.endpoints, axis=2), np.array([[0.0, 1.0], [-1.0, 0.0]])
+    slope = np.array([0.004, 0.009, -0.006, -0.012])[:, None, None]  # each about its own middle
+    opened = walls.endpoints + 0.5 * slope * np.array([[-1.0], [1.0]]) * (along @ across)
+    assert correct_wall_places(tracks, replace(walls, endpoints=opened))[1] == ""
+    two = np.array([0, 2])
+    less = WallTracks(("bottom", "top"), turned(walls.endpoints[:, two], 0.5, 0.0), walls.pressure[two])
+    assert correct_wall_places(tracks, less)[1] == ""
+
+
+def test_a_wall_in_its_place_needs_as_many_rods_as_another():
+    tracks, walls, radius = rolling_tracks(), misplaced(5e-4), rolling_tracks().radius.copy()
+    radius[:5] -= 2e-4 * np.arange(1, 6)  # half of the rods at the other wall touch it
+    radius[N - np.array([1, 3, 4, 6, 8, 9])] -= 2e-4 * np.array([2, 6, 3, 7, 1, 5])  # and four of ten this one
+    assert "0.5 mm too far outside" in correct_wall_places(replace(tracks, radius=radius), walls)[1]
