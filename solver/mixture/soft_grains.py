@@ -24,7 +24,9 @@ from ..posterior.sequence_evidence import SequenceEvidence, gather_position_evid
 # shows overlaps. In eight packings of another simulation with 1.9 to 2.4 times the noise r was .86 to .97 with 2.5 and
 # 1.2, where calibration removed them as errors, and is .98 to .99; no case of seeds 81 and 82 loses.
 MIN_OVERLAP, MIN_SD = 1.5, 1.1
-OVERLAP_RATIO = (0.5, 2.5)  # mean overlap over the gaps' standard deviation; hard packings: up to .2 above MIN_OVERLAP
+# Mean overlap over the gaps' standard deviation, in hard packings up to .2 above MIN_OVERLAP, and over its part that is
+# not noise: wrong radii of a class make overlaps that are all alike.
+OVERLAP_RATIO = (0.5, 2.5)
 # Variance of overlaps that no errors of single grains explain, over all: .33 to 1.1 of soft grains, .01 to .09 where
 # radii are wrong.
 LEAST_OF_PAIRS = 0.2
@@ -42,9 +44,9 @@ def judge_gaps(packing: Packing, snapshots: Sequence[Snapshot]) -> tuple[float, 
     Notes
     -----
     With o and s the mean overlap and standard deviation of touching gaps, σ the noise of a position, o' the overlap by
-    `measure_precision`: soft if o' ≥ 1.5 σ, 0.5 s < o < 2.5 s, s > 1.1 √2 σ, and `fraction_of_pairs` is not small. A
-    wrong scale shifts o and leaves the other measures: the gaps are then those of soft grains, or of hard ones with
-    errors of centres or radii.
+    `measure_precision`: soft if o' ≥ 1.5 σ, 0.5 s < o < 2.5 √(s² − 2σ²), s > 1.1 √2 σ, and `fraction_of_pairs` is not
+    small. A wrong scale shifts o and leaves the other measures: the gaps are then those of soft grains, or of hard ones
+    with errors of centres or radii.
     """
     found = measure_precision(packing.grains, snapshots)
     if found is None or found.overlap < MIN_OVERLAP * found.sigma:
@@ -55,7 +57,8 @@ def judge_gaps(packing: Packing, snapshots: Sequence[Snapshot]) -> tuple[float, 
         return 0.0, False
     overlap, sd = -evidence.touching.offset, evidence.touching.sd
     scattered = sd > MIN_SD * 2.0**0.5 * found.sigma and fraction_of_pairs(evidence) >= LEAST_OF_PAIRS
-    soft = scattered and OVERLAP_RATIO[0] * sd < overlap < OVERLAP_RATIO[1] * sd
+    of_forces = float(np.sqrt(max(sd**2 - 2.0 * found.sigma**2, 0.0)))  # forces vary, and overlaps with them
+    soft = scattered and OVERLAP_RATIO[0] * sd < overlap < OVERLAP_RATIO[1] * of_forces
     return (overlap, False) if soft else (0.0, scattered)
 
 

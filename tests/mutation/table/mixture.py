@@ -134,6 +134,7 @@ MUTANTS = [
         ("sd > MIN_SD * 2.0**0.5 * found.sigma and", ""),
         ("and fraction_of_pairs(evidence) >= LEAST_OF_PAIRS", ""),
         ("else (0.0, scattered)", "else (0.0, False)"),
+        ("OVERLAP_RATIO[1] * of_forces", "OVERLAP_RATIO[1] * sd"),
         ("(j < count) & (gap < 0.0)", "j < count"),
         ("if spare < FEWEST_PAIRS:", "if False:"),
     ),

@@ -48,6 +48,20 @@ def test_a_wrong_scale_hides_overlaps_among_gaps_that_scatter(hard, soft) -> Non
     assert judge_gaps(hard.packing, hard.snapshots) == (0.0, False)
 
 
+def test_overlaps_of_twice_the_noise_are_found() -> None:
+    stiffer = simulate_shear(0.25, 6, normal_stiffness=4e6)
+    assert find_soft_overlap(stiffer.packing, stiffer.snapshots) == pytest.approx(1.3 * NOISE, rel=0.1)
+
+
+def test_large_overlaps_that_are_all_alike_are_no_softness(hard) -> None:
+    """Errors of the centres make the gaps scatter more than noise, but not as much as forces of that mean overlap."""
+    wrong = hard.packing.grains.radius + 1.9 * NOISE
+    packing = replace(hard.packing, grains=Grains.of_rods(wrong, density=2700.0, length=0.06))
+    error = 1.2 * NOISE * np.random.default_rng(1).standard_normal(hard.snapshots[0].position.shape)
+    seen = [replace(each, position=each.position + error) for each in hard.snapshots]
+    assert judge_gaps(packing, seen) == (0.0, True)
+
+
 @pytest.mark.parametrize("error", ["radii", "all radii alike", "a fifth too large"])
 def test_wrong_radii_of_hard_grains_are_no_softness(hard, error) -> None:
     rng = np.random.default_rng(1)
