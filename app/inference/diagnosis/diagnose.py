@@ -151,15 +151,21 @@ def _examine_walls(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, list[
 def _compare_rivals(
     inputs: Inputs, trial: Trial, progress: Progress, first: int, excluded: Collection[str]
 ) -> list[Finding]:
-    """Solve the rivals of the geometry, and name the clearly best one unless its cause is excluded."""
+    """Solve the rivals of the geometry, and name the clearly best one unless its cause is excluded.
+
+    What an error of the opposite sense raises as well is none of it: calibration removes either, and much of the noise.
+    """
     offset = math.nan if trial.soft else _mean_gap(inputs)
     rivals = [each for each in rivals_of(inputs) if not each.gap * offset < GAP_SHOWN * each.gap**2]
-    rise: dict[str, tuple[float, str]] = {}
+    gains: dict[tuple[str, float], float] = {}
     for done, rival in enumerate(rivals):
         progress("diagnosing", done, len(rivals))
-        score = trial_score(rival.change(inputs), first)
-        rise[rival.cause] = max(rise.get(rival.cause, (float("-inf"), "")), (score - trial.score, rival.words))
+        gains[rival.cause, rival.size] = trial_score(rival.change(inputs), first) - trial.score
     progress("diagnosing", len(rivals), len(rivals))
+    rise: dict[str, tuple[float, str]] = {}
+    for rival in rivals:
+        gain = gains[rival.cause, rival.size] - max(gains.get((rival.cause, -rival.size), 0.0), 0.0)
+        rise[rival.cause] = max(rise.get(rival.cause, (float("-inf"), "")), (gain, rival.words))
     best = _clearest_cause(rise)
     if best and best not in excluded:
         gain, words = rise[best]

@@ -24,20 +24,21 @@ class Rival:
     cause: str
     words: str  # the assumption
     change: Callable[[Inputs], Inputs]
+    size: float  # of the error that it assumes, with its sense
     gap: float = 0.0  # over a diameter, mean gap of touching hard rods in the given input if it is true; 0: any
 
 
 def rivals_of(inputs: Inputs) -> Iterator[Rival]:
     """Give the alternatives to an input."""
     for stretch in STRETCHES:
-        yield Rival("stretched_picture", f"x is stretched by {-100.0 * stretch:g} %", _stretched(stretch))
+        yield Rival("stretched_picture", f"x is stretched by {-100.0 * stretch:g} %", _stretched(stretch), stretch)
     for error in RADIUS_ERRORS:
-        yield Rival("all_radii", f"all radii are stated {_wrong_by(error)}", _with_radii(1.0 + error), error)
+        yield Rival("all_radii", f"all radii are stated {_wrong_by(error)}", _with_radii(1.0 + error), error, error)
     classes = np.unique(np.round(inputs.tracks.radius, 6))
     if 1 < len(classes) <= MOST_CLASSES:
         for error in CLASS_ERRORS:
             words = f"the largest rods are stated {_wrong_by(error)}"
-            yield Rival("class_radii", words, _with_class(float(classes[-1]), 1.0 + error))
+            yield Rival("class_radii", words, _with_class(float(classes[-1]), 1.0 + error), error)
 
 
 def _wrong_by(error: float) -> str:

@@ -25,7 +25,10 @@ INPUTS = replace(INPUTS, tracks=replace(INPUTS.tracks, rotation=np.full_like(INP
 
 @pytest.fixture
 def scores(monkeypatch):
-    """Scores of rivals by their cause over that of the given input, instead of solving them."""
+    """Scores of rivals by their cause over that of the given input, instead of solving them.
+
+    Of errors of one sense; of the other sense under the name "other sense".
+    """
     rises: dict[str, float] = {}
     given = Trial((WRONG,), 1).score
     by_input = {}
@@ -33,7 +36,7 @@ def scores(monkeypatch):
     def rivals(inputs):
         for each in rivals_of(inputs):
             changed = each.change(inputs)
-            by_input[id(changed)] = (changed, each.cause)
+            by_input[id(changed)] = (changed, each.cause if each.size > 0.0 else "other sense")
             yield replace(each, change=lambda _, changed=changed: changed)
 
     monkeypatch.setattr(module, "rivals_of", rivals)
@@ -53,6 +56,13 @@ def test_the_clear_winner_is_named_with_effect_and_cure(scores, monkeypatch):
     assert found.cause == "all_radii"
     assert found.effect == CAUSES["all_radii"].effect
     assert "Cure: measure the radii anew" in found.sentence()
+
+
+def test_an_error_that_fits_as_well_in_the_other_sense_is_not_named(scores):
+    scores["all_radii"] = 0.8
+    assert causes() == ["all_radii"]
+    scores["other sense"] = 0.65
+    assert causes() == ["not_explained"]
 
 
 @pytest.mark.thorough
