@@ -52,9 +52,9 @@ def measure_section_shape(position: Array, radius: Array, boundary: NDArray[np.b
 
     Notes
     -----
-    Let g be the gaps of candidate pairs, up to twice the rms overlap, less their regression on 1, l cos 2φ and
-    l sin 2φ, the effect of a stretched picture on branch vectors (l, φ). Of two gaps of the same rod in directions
-    φ and φ' from it
+    Let g be the gaps of candidate pairs, up to twice the rms overlap, less their regression on 1, l, l cos 2φ and
+    l sin 2φ, the effects of a wrong scale and a stretched picture on branch vectors (l, φ). Of two gaps of the same rod
+    in directions φ and φ' from it
 
         E[g g'] = σ_R² + σ_c² cos(φ − φ') + ½ ⟨(e R)²⟩ cos 2(φ − φ')
 
@@ -100,7 +100,8 @@ def _gaps_of_rods(
         return np.empty(0), np.empty(0), np.empty(0, np.int64)
     angle = np.arctan2(pairs.normal[near, 1], pairs.normal[near, 0])
     length = gap + radius[i] + radius[j]
-    shared = np.stack([np.ones(len(gap)), length * np.cos(2.0 * angle), length * np.sin(2.0 * angle)], axis=1)
+    both = np.ones(len(gap)), length, length * np.cos(2.0 * angle), length * np.sin(2.0 * angle)
+    shared = np.stack(both, axis=1)
     shared /= np.abs(shared).max(axis=0)
     gap = gap - shared @ np.linalg.lstsq(shared, gap, rcond=None)[0]
     rod = np.concatenate([i, j]).astype(np.int64)

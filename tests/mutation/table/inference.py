@@ -72,6 +72,7 @@ MUTANTS = [
         "solver/boundary/section_shape.py",
         f"{TESTS}/diagnosis/test_sections.py",
         ("np.cos(2.0 * between)", "np.cos(3.0 * between)"),
+        ("np.ones(len(gap)), length, length", "np.ones(len(gap)), length"),
     ),
     *mutants_of(
         "app/inference/correction/tables/wall_times.py",

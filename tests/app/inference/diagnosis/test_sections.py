@@ -79,3 +79,16 @@ def test_rods_without_neighbours_and_missing_rods_are_no_evidence(elliptic_rods)
     lost = position.copy()
     lost[0, :5] = np.nan
     assert named(measure_section_shape(lost, radius))
+
+
+def test_a_wrong_scale_beside_large_rods_is_no_ovality() -> None:
+    """Rings of small rods that touch each other and a large one between them, in a picture that is 1 % too small."""
+    rng, step = np.random.default_rng(4), 2.0 * np.arcsin(0.2)
+    position, radius = [], []
+    for number in range(40):
+        angle = rng.uniform(0.0, 2.0 * np.pi) + step * np.arange(15)
+        ring = 0.025 * np.column_stack([np.cos(angle), np.sin(angle)])
+        position.append(0.1 * np.array([number % 7, number // 7]) + np.concatenate([np.zeros((1, 2)), ring]))
+        radius.append(np.append(0.02, np.full(15, 0.005)))
+    place = np.concatenate(position) + NOISE * rng.standard_normal((40 * 16, 2))
+    assert measure_section_shape(0.99 * place[None], np.concatenate(radius)).fraction < 0.5 * DOMINANT
