@@ -23,7 +23,7 @@ from ...solver.assessment.intervals.wall_sensors import contradicting
 from ...solver.convex.friction_check import QUIET
 from ...tracks import Tracks, WallTracks
 from ..correction.correct_sequence import complete_walls, correct_sequence
-from ..correction.tables.outliers import restore_exchanged_ids
+from ..correction.tables.outliers import find_repeated, restore_exchanged_ids, without_poses
 from ..correction.tables.rotations import correct_rotations
 from ..correction.tables.wall_places import correct_wall_places
 from ..correction.tables.wall_times import correct_wall_times
@@ -92,6 +92,8 @@ def diagnose(
         Empty where nothing contradicts the model.
     """
     restored, exchanged = restore_exchanged_ids(inputs.tracks)
+    repeated = find_repeated(restored)
+    restored = without_poses(restored, repeated) if repeated.any() else restored
     names = [finding("exchanged_ids", exchanged)] if exchanged else []
     walls, failed = complete_walls(restored, inputs.walls)
     if len(failed) == restored.frame_count:
@@ -117,7 +119,7 @@ def diagnose(
     found += examine_sizes(tracks, walls) or examine_sections(tracks)
     found += examine_inertia(tracks, walls, inputs.material) + examine_load(tracks, walls, inputs.material)
     impossible = np.zeros(tracks.status.shape, np.bool_) if undisturbed else find_impossible_poses(tracks, walls)
-    poses = examine_poses(tracks, impossible)
+    poses = examine_poses(tracks, impossible, repeated)
     if not found and sliding and inputs.tracks.grain_count >= LEAST_GRAINS:
         found = _examine_sliding(inputs, first) or (_examine_sliding(inputs, 0) if first else [])
     if not (found or trial is None or inputs.tracks.grain_count < LEAST_GRAINS):

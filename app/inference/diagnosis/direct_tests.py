@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...process.counts import state_count
 from ...results.finding import Finding
 from ...solver.bodies.grains import Array, Grains
 from ...solver.bodies.outer_grains import find_outer_grains
@@ -76,9 +77,14 @@ def _nothing_moves(step: Array, noise: float) -> NDArray[np.bool_]:
     return step < SAME * noise
 
 
-def examine_poses(tracks: Tracks, impossible: NDArray[np.bool_]) -> list[Finding]:
-    """Look for rods that photographs lack, and for those that jump for one photograph: the impossible poses (f, n)."""
+def examine_poses(tracks: Tracks, impossible: NDArray[np.bool_], repeated: NDArray[np.bool_]) -> list[Finding]:
+    """Look for rods that photographs lack, that jump for one photograph, or whose poses are repeated (f, n)."""
     found = []
+    if repeated.any():
+        listed = ", ".join(map(str, tracks.id[repeated.any(axis=0)][:NAMED]))
+        poses, verb = state_count(int(repeated.sum()), "pose"), "repeats" if repeated.sum() == 1 else "repeat"
+        words = f"{poses} {verb} the one before digit by digit while other rods move: rods {listed}"
+        found.append(finding("outlier_tracks", words))
     if impossible.any():
         frames = np.flatnonzero(impossible.any(axis=1)).tolist()
         words = ", ".join(map(str, frames[:4])) + ("…" if len(frames) > 4 else "")

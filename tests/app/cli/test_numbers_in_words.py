@@ -49,7 +49,7 @@ def test_check_counts_the_grains_that_the_tracks_hold(tracked, capsys):
 )
 def test_poses_jump_against_their_own_neighbours(count, words):
     (found,) = examine_poses(
-        SimpleNamespace(present=np.ones((3, 4))), np.eye(3, 4, dtype=bool) & (np.arange(4) < count)
+        SimpleNamespace(present=np.ones((3, 4))), np.eye(3, 4, dtype=bool) & (np.arange(4) < count), np.zeros((3, 4))
     )
     assert words in found.evidence
 

@@ -59,6 +59,8 @@ MUTANTS = [
         "app/inference/correction/tables/outliers.py",
         OUTLIERS,
         ("if changed.any():\n            grains", "if True:\n            grains"),
+        ("    found &= moved\n", ""),
+        ("found[found.sum(axis=1) > max(FEW * tracks.grain_count, 1.0)] = False", "pass"),
         ("changed = (row[k] != row[k - 1]) & restored.present_in(k)", "changed = row[k] != row[k - 1]"),
     ),
     *mutants_of(

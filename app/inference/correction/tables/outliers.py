@@ -28,13 +28,14 @@ ONE_SIDED = 1.2  # times the least jump, where only photographs on one side show
 PASSES = 8  # an outlier hides the one before or after it until it is interpolated
 MOST = 0.1  # of the poses of a frame: where more jump, the packing rearranges
 MISPLACED = 0.25  # of a radius, and JUMP deviations among the neighbours: a suspect pose so far from theirs is wrong
+FEW = 0.02  # of the rods: more repeat their poses in a photograph that is a copy, or whose rods rest
 NAMED, LISTED = 6, 4  # rods of one photograph, and photographs, that a sentence lists
 
 
 def remove_outliers(
     tracks: Tracks, walls: WallTracks | None = None, placed: NDArray[np.bool_] | None = None
 ) -> tuple[Tracks, str]:
-    """Take out poses that are misplaced, or of rods that jump for one photograph; they are lost there.
+    """Take out poses that are repeated or misplaced, or of rods that jump for one photograph; they are lost there.
 
     Parameters
     ----------
@@ -52,11 +53,14 @@ def remove_outliers(
         How many there were; empty where there is none.
     """
     free = True if placed is None else ~placed
+    repeated = find_repeated(tracks) & free
+    tracks = without_poses(tracks, repeated) if repeated.any() else tracks
     misplaced = find_misplaced(tracks) & free
     tracks = without_poses(tracks, misplaced) if misplaced.any() else tracks
     outlier = find_outliers(tracks, walls) & free
     tracks = without_poses(tracks, outlier) if outlier.any() else tracks
     remarks = (
+        _describe(repeated, "repeats the one before digit by digit", "repeat the ones before digit by digit"),
         _describe(
             misplaced, "is a suspect match far from its neighbours", "are suspect matches far from their neighbours"
         ),
@@ -153,6 +157,21 @@ def find_outliers(tracks: Tracks, walls: WallTracks | None = None) -> NDArray[np
         found |= more
         search.interpolate(found)
         changed = sorted({k for row in rows for k in range(max(row - 2, 0), min(row + 3, frames))})
+    return found
+
+
+def find_repeated(tracks: Tracks) -> NDArray[np.bool_]:
+    """Find poses (f, n) that equal those before in every digit, of rods that moved before: trackers repeat lost rods.
+
+    Where more than FEW of the rods do so, the photograph is a copy, or the rods rest and are known without noise; a rod
+    that never moves is fixed.
+    """
+    pose = np.concatenate([tracks.position, np.nan_to_num(tracks.rotation)[..., None]], axis=-1)
+    found = np.zeros(tracks.status.shape, np.bool_)
+    found[1:] = (pose[1:] == pose[:-1]).all(axis=-1)  # not where there is none
+    moved = np.cumsum(tracks.present & ~found, axis=0) > 1
+    found &= moved
+    found[found.sum(axis=1) > max(FEW * tracks.grain_count, 1.0)] = False
     return found
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rodsight.inference.correction.radii import find_oversized_rods, find_wrong_sizes
-from rodsight.inference.correction.tables.outliers import find_outliers
+from rodsight.inference.correction.tables.outliers import find_outliers, find_repeated, without_poses
 from rodsight.inference.diagnosis.direct_tests import (
     examine_inertia,
     examine_load,
@@ -124,7 +124,19 @@ def test_photographs_in_random_order_are_named():
 
 
 def named_poses(tracks):
-    return examine_poses(tracks, find_impossible_poses(tracks))
+    repeated = find_repeated(tracks)
+    tracks = without_poses(tracks, repeated)
+    return examine_poses(tracks, find_impossible_poses(tracks), repeated)
+
+
+def test_a_rod_whose_pose_is_repeated_is_named():
+    tracks = rolling_tracks()
+    position = tracks.position.copy()
+    position[4:6, 33] = position[3, 33]
+    (found,) = named_poses(replace(tracks, position=position))
+    assert (found.cause, found.evidence) == (
+        "outlier_tracks", "2 poses repeat the one before digit by digit while other rods move: rods 33",
+    )  # fmt: skip
 
 
 def test_one_displaced_photograph_is_in_the_right_order():

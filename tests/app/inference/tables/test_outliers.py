@@ -7,6 +7,7 @@ import pytest
 from rodsight.inference.correction.tables.outliers import (
     find_misplaced,
     find_outliers,
+    find_repeated,
     remove_outliers,
     restore_exchanged_ids,
 )
@@ -51,6 +52,22 @@ def test_a_jump_for_one_photograph_counts_as_lost(frame):
     others = np.arange(N) != ROD
     assert np.array_equal(found.position[:, others], tracks.position[:, others])
     assert "1 pose in 1 photograph jumps" in remark
+
+
+def test_poses_that_a_tracker_repeats_count_as_lost():
+    tracks = sheared_tracks()
+    position, rotation = tracks.position.copy(), tracks.rotation.copy()
+    position[3:5, ROD], rotation[3:5, ROD] = position[2, ROD], rotation[2, ROD]
+    repeated = replace(tracks, position=position, rotation=rotation)
+    assert np.argwhere(find_repeated(repeated)).tolist() == [[3, ROD], [4, ROD]]
+    found, remark = remove_outliers(repeated)
+    assert found.lost[3:5, ROD].all()
+    assert "2 poses in 2 photographs repeat the ones before digit by digit" in remark
+    position[:, ROD], rotation[:, ROD] = position[2, ROD], rotation[2, ROD]  # it is fixed
+    assert not find_repeated(replace(tracks, position=position, rotation=rotation)).any()
+    position[3], rotation[3] = position[2], rotation[2]  # the photograph is a copy
+    position[4, ROD] += 1e-3
+    assert not find_repeated(replace(tracks, position=position, rotation=rotation)).any()
 
 
 @pytest.mark.parametrize("frame", [0, 3, FRAMES - 1])
