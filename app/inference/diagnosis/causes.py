@@ -72,7 +72,7 @@ CAUSES: dict[str, Cause] = {
         "load more slowly, or photograph at rest",
     ),
     "outlier_tracks": Cause(
-        "a rod that jumps for one photograph seems to slide; its pose is interpolated there",
+        "a rod that jumps for one photograph, or whose pose is repeated, seems to slide; it is interpolated there",
         "look at these rods in these photographs",
         corrected=True,
     ),
@@ -88,7 +88,7 @@ CAUSES: dict[str, Cause] = {
     ),
     "wall_misplaced": Cause(
         "rods stand beyond a wall or touch none of it: it then carries too much force, or none",
-        "a run moves it to the rods that touch it: correct the ends of the wall",
+        "a run moves it, or all as of a turned camera, to the rods that touch it: correct the ends of the walls",
         corrected=True,
     ),
     "walls_shifted": Cause(
