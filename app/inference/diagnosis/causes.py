@@ -88,7 +88,7 @@ CAUSES: dict[str, Cause] = {
     ),
     "wall_misplaced": Cause(
         "rods stand beyond a wall or touch none of it: it then carries too much force, or none",
-        "a run moves it, or all as of a turned camera, to the rods that touch it: correct the ends of the walls",
+        "a run moves it to the rods that touch it, or turns all walls together: correct the ends of the walls",
         corrected=True,
     ),
     "walls_shifted": Cause(
