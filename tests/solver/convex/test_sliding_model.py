@@ -361,6 +361,17 @@ def test_no_rods_have_the_friction_that_a_reversed_motion_shows(frames, monkeypa
     assert found.cause == cause
 
 
+@pytest.mark.parametrize(("turned", "cause"), [(0.3, "photographs_reversed"), (0.4, "")])
+def test_a_reversed_motion_that_leaves_much_of_the_gap_explains_nothing(frames, monkeypatch, turned, cause):
+    gaps = iter([1.0, turned])
+    monkeypatch.setattr(resistance, "power_gap", lambda *_: next(gaps))
+    none = FittedModel(GIVEN, 1.0, False)
+    monkeypatch.setattr(resistance, "compare_models", lambda frames, given, rivals, workers: [none] * len(rivals))
+    found = find_resistance(frames[2], GIVEN)
+    assert found is not None
+    assert found.cause == cause
+
+
 def test_a_gap_that_is_nothing_in_either_order_names_no_order(frames, monkeypatch):
     gaps = iter([0.004, 0.001])
     monkeypatch.setattr(resistance, "power_gap", lambda *_: next(gaps))

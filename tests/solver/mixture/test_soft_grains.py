@@ -81,6 +81,7 @@ def test_an_overlap_without_variance_of_its_own_is_no_softness(hard) -> None:
         hard.packing, grains=Grains.of_rods(hard.packing.grains.radius + 1.2 * NOISE, density=2700.0, length=0.06)
     )
     assert find_soft_overlap(packing, hard.snapshots) == 0.0
+    assert judge_gaps(packing, hard.snapshots) == (0.0, False)  # nor is any hidden
 
 
 def test_overlaps_of_pairs_are_distinguished_from_errors_of_grains(soft) -> None:

@@ -58,6 +58,15 @@ def test_the_clear_winner_is_named_with_effect_and_cure(scores, monkeypatch):
     assert "Cure: measure the radii anew" in found.sentence()
 
 
+def test_poses_that_a_tracker_repeats_are_named_and_are_no_jumps():
+    position = INPUTS.tracks.position.copy()
+    position[4:6, 33] = position[3, 33]
+    (found,) = diagnose(replace(INPUTS, tracks=replace(INPUTS.tracks, position=position)), None)
+    assert found.cause == "outlier_tracks"
+    assert "repeat the one before digit by digit" in found.evidence
+    assert found.corrected
+
+
 def test_an_error_that_fits_as_well_in_the_other_sense_is_not_named(scores):
     scores["all_radii"] = 0.8
     assert causes() == ["all_radii"]
