@@ -24,7 +24,7 @@ from ..solver.boundary.size_classes import find_common_sizes
 from ..solver.even_subset import even_subset
 from ..solver.robust_scale import SD_OVER_MAD
 from .detection.detect import MIN_RADIUS, TOUCHING, Detection, DetectionSettings, MissedGrainSearch, detect_grains
-from .detection.rings import not_overlapping
+from .detection.rings import beside
 
 SMALLEST = 0.05  # quantile of the radii below which nothing is looked for
 FITS = 0.85  # of the smallest radius: a place so wide may hold a rod that others hide in part
@@ -87,7 +87,7 @@ def detect_rods(image: Image, settings: DetectionSettings | None = None) -> Dete
         if new.count == 0:
             break
         found = found.join(new)
-    return found.join(others.select(_beside(_circles(others), _circles(found))))
+    return found.join(others.select(beside(_circles(others), _circles(found), allowed=TOUCHING)))
 
 
 def _are_plain(image: Image, found: Detection) -> bool:
@@ -123,11 +123,6 @@ def _find_larger(image: Image, found: Detection, settings: DetectionSettings) ->
 
 def _circles(found: Detection) -> Array:
     return np.column_stack([found.x, found.y, found.radius])
-
-
-def _beside(circles: Array, found: Array) -> NDArray[np.bool_]:
-    """Mark the circles (n, 3) that overlap none of those found (c, 3) by more than touching ones."""
-    return not_overlapping(circles, found, np.full_like(circles, np.nan), allowed=TOUCHING)
 
 
 def _sizes(radius: Array, settings: DetectionSettings) -> tuple[Array, NDArray[np.bool_]]:

@@ -15,12 +15,18 @@ from numpy.typing import NDArray
 from ..bodies.grains import Array
 from ..even_subset import even_subset
 from ..quantity import Quantity
-from .touching_pairs import TouchingFit, count_classes, find_near_pairs, fit_touching_pairs, place_dependence
+from .touching_pairs import (
+    FEWEST_PAIRS,
+    SIGNIFICANT,
+    TouchingFit,
+    count_classes,
+    find_near_pairs,
+    fit_touching_pairs,
+    place_dependence,
+)
 
 MOST_FRAMES = 8  # of which gaps are read, evenly over the sequence …
 MOST_POSES, FEWEST_FRAMES = 20_000, 2  # … and poses in them: more show the same distortion; frames at least
-FEWEST_PAIRS = 100  # in a frame
-SIGNIFICANT = 5.0  # standard errors
 EXPLAINED = 0.95  # greatest ratio of the robust scatter of touching gaps after a correction to that before
 # Unknowns of the model, by their rows.
 ANISOTROPY, RADIAL, PERSPECTIVE, DECENTRING, UNKNOWNS = slice(0, 2), slice(2, 6), slice(6, 8), slice(8, 10), 10

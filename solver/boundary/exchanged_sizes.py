@@ -105,12 +105,12 @@ def find_exchanged_sizes(
             break
         found[change] = sizes[best[change]]
     exchanged = np.abs(found - radius) > touch
+    if not exchanged.any():
+        return radius
     # A grain whose whole class is stated too large lies inside its neighbours, too: much smaller, it is far from all.
     stands = _score(pairs, found, np.append(found, of_walls), touch) / frames >= FEWEST
     inside = -_least_gap(pairs, radius, np.append(radius, of_walls))
     exchanged &= stands | (_least_gap(pairs, found, np.append(found, of_walls)) < inside)
-    if not exchanged.any():
-        return radius
     pairs = pairs.select(pairs.other < len(radius))
     kept = pairs.select(~(exchanged[pairs.grain] | exchanged[pairs.other]))
     _, overlap = _mean_overlaps(kept, radius, touch)

@@ -100,8 +100,8 @@ def _gaps_of_rods(
         return np.empty(0), np.empty(0), np.empty(0, np.int64)
     angle = np.arctan2(pairs.normal[near, 1], pairs.normal[near, 0])
     length = gap + radius[i] + radius[j]
-    both = np.ones(len(gap)), length, length * np.cos(2.0 * angle), length * np.sin(2.0 * angle)
-    shared = np.stack(both, axis=1)
+    effects = np.ones(len(gap)), length, length * np.cos(2.0 * angle), length * np.sin(2.0 * angle)
+    shared = np.stack(effects, axis=1)
     shared /= np.abs(shared).max(axis=0)
     gap = gap - shared @ np.linalg.lstsq(shared, gap, rcond=None)[0]
     rod = np.concatenate([i, j]).astype(np.int64)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..bodies.grains import Array
 from ..even_subset import even_subset
-from .touching_pairs import count_classes, find_near_pairs, fit_touching_pairs
+from .touching_pairs import SIGNIFICANT, count_classes, find_near_pairs, fit_touching_pairs
 
 MIN_GAP, MAX_RANGE = 0.1, 0.12  # over the mean radius: between sizes, and of the readings of one size
 MAX_SIZES, MIN_GRAINS = 4, 10
@@ -24,7 +24,6 @@ RARE, NEAR_SIZE = 0.02, 0.14
 COMMON = 0.9  # fraction of the grains that have one of the common sizes
 MOST_FRAMES = 8  # of which gaps are read, evenly over the sequence
 FEWEST_PAIRS = 50  # in a frame
-SIGNIFICANT = 5.0  # standard errors
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,10 +18,10 @@ FIRST_WIDTH, SHRINK, LAST_WIDTH = 0.12, 0.75, 1.5  # mean diameters; factor of a
 NEAR_WIDTH = 0.04  # mean diameters: where the solution is nearly known
 ROUNDS = 30
 CONVERGED = 1e-3  # scatters: change of a residual in a round
-SECTORS, RINGS = 8, 3  # parts of the picture in which gaps are compared …
-FEWEST_OF_PART = 100  # … with so many pairs
+SECTORS, RINGS = 8, 3  # parts of the picture in which gaps are compared
+FEWEST_PAIRS = 100  # in such a part, or in a frame that shows a distortion
 UNEXPLAINED = 1.0  # robust standard deviations of a touching gap: range of the usual one over the parts of the picture
-SIGNIFICANT = 5.0  # standard errors of it
+SIGNIFICANT = 5.0  # standard errors of an unknown
 NARROWEST = 1e-6  # mean diameters: width for gaps without any error
 
 
@@ -146,7 +146,7 @@ def place_dependence(fit: TouchingFit, place: Float[Array, "m 2"], diameter: flo
     usual, error = [], []
     for number in np.unique(part):
         gap = fit.residual[part == number]
-        if len(gap) < FEWEST_OF_PART:
+        if len(gap) < FEWEST_PAIRS:
             continue
         local = fit_touching_pairs(gap, np.full((len(gap), 1), -1.0), np.array([False]), diameter, frames)
         usual.append(local.value[0])

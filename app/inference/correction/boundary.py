@@ -137,7 +137,8 @@ def _changed_gap(found: CameraDistortion, position: Array, radius: Array) -> flo
         near, corrected = find_near_pairs(position[k], radius), found.correct(position[k])
         apart = np.linalg.norm(corrected[near.j] - corrected[near.i], axis=1)
         change.append(apart - radius[near.i] - radius[near.j] - near.gap)
-    return float(np.std(np.concatenate(change))) if any(len(each) for each in change) else 0.0
+    changes = np.concatenate(change)
+    return float(np.std(changes)) if len(changes) else 0.0
 
 
 def _noise_of_gaps(material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]) -> float:

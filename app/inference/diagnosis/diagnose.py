@@ -93,7 +93,7 @@ def diagnose(
     """
     restored, exchanged = restore_exchanged_ids(inputs.tracks)
     repeated = find_repeated(restored)
-    restored = without_poses(restored, repeated) if repeated.any() else restored
+    restored = without_poses(restored, repeated)
     names = [finding("exchanged_ids", exchanged)] if exchanged else []
     walls, failed = complete_walls(restored, inputs.walls)
     if len(failed) == restored.frame_count:

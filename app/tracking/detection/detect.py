@@ -20,7 +20,7 @@ from ...solver.robust_scale import SD_OVER_MAD
 from ..correlation.edge_width import SharpCopy, sharpest_copy
 from .circle_measurement import CircleMeasurer, MeasuredCircle
 from .discs import OVERLAP, Discs, find_discs
-from .rings import Circles, find_circles, not_overlapping, without_overlap
+from .rings import Circles, beside, find_circles, not_overlapping, without_overlap
 
 # Least half width of the search for the edges of a ring [px], whose centre has an error of that size or larger.
 RING_UNCERTAINTY = 3.0
@@ -213,20 +213,15 @@ class MissedGrainSearch:
         old = np.column_stack([*copy.to_copy(found.x, found.y), found.radius / copy.factor])
         away = KDTree(np.column_stack(copy.to_copy(*places.T))).query(np.column_stack([rough.x, rough.y]))[0]
         near = rough.select(away < NEAR_PLACE * rough.radius)
-        near = near.select(_beside(np.column_stack([near.x, near.y, near.radius]), old, FINE_OVERLAP))
+        near = near.select(beside(np.column_stack([near.x, near.y, near.radius]), old, allowed=FINE_OVERLAP))
         table = _judge(self._measurer, near, np.empty((0, 4)), True, least)
-        table = table[_beside(table[:, :3], old, TOUCHING)]
+        table = table[beside(table[:, :3], old, allowed=TOUCHING)]
         reference = old[:: max(len(old) // REFERENCE_GRAINS, 1)]
         both = np.concatenate([table[:, :3], reference]) if len(table) else table[:, :3]
         refined = _refine(self._measurer, *both.T, fixed_radius=bool(self._settings.radii))
         good = _measured_closely(refined, least) & (np.arange(refined.count) < len(table))
         good &= np.abs(refined.radius / np.maximum(both[:, 2], 1.0) - 1.0) < SAME_SIZE
         return _on_photograph(refined.select(good), copy, self._settings.radii)
-
-
-def _beside(circles: Array, found: Array, overlap: float) -> NDArray[np.bool_]:
-    """Mark the circles (c, 3) that overlap none of the found ones (n, 3) by more than a fraction of a radius."""
-    return not_overlapping(circles, found, np.full_like(circles, np.nan), allowed=overlap)
 
 
 def refine_grains(image: Image, x: Array, y: Array, radius: Array, *, fixed_radius: bool = True) -> Detection:

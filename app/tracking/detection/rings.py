@@ -134,6 +134,11 @@ def strike_out(circles, allowed, cell, head, following, alive):
             head[row, column] = k
 
 
+def beside(circles: Array, found: Array, *, allowed: float) -> np.ndarray:
+    """Mark the circles (n, 3) that overlap none of the found ones (c, 3) by more than a fraction of a radius."""
+    return not_overlapping(circles, found, np.full_like(circles, np.nan), allowed=allowed)
+
+
 def not_overlapping(circles: Array, found: Array, overlapped: Array, *, allowed: float) -> np.ndarray:
     """Return which circles overlap none of the found ones.
 

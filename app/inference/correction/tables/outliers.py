@@ -54,11 +54,11 @@ def remove_outliers(
     """
     free = True if placed is None else ~placed
     repeated = find_repeated(tracks) & free
-    tracks = without_poses(tracks, repeated) if repeated.any() else tracks
+    tracks = without_poses(tracks, repeated)
     misplaced = find_misplaced(tracks) & free
-    tracks = without_poses(tracks, misplaced) if misplaced.any() else tracks
+    tracks = without_poses(tracks, misplaced)
     outlier = find_outliers(tracks, walls) & free
-    tracks = without_poses(tracks, outlier) if outlier.any() else tracks
+    tracks = without_poses(tracks, outlier)
     remarks = (
         _describe(repeated, "repeats the one before digit by digit", "repeat the ones before digit by digit"),
         _describe(
@@ -105,7 +105,9 @@ def restore_exchanged_ids(tracks: Tracks) -> tuple[Tracks, str]:
 
 
 def without_poses(tracks: Tracks, lost: NDArray[np.bool_]) -> Tracks:
-    """The tracks with some poses (f, n) lost."""
+    """The tracks with some poses (f, n) lost; with none of them, themselves."""
+    if not lost.any():
+        return tracks
     return replace(
         tracks,
         position=np.where(lost[..., None], np.nan, tracks.position),

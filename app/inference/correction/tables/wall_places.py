@@ -10,6 +10,7 @@ from scipy.stats import theilslopes
 
 from ....solver.bodies.grains import Array
 from ....solver.bodies.wall_shapes import outward_normals
+from ....solver.calibration.equations import move_walls
 from ....tracks import Tracks, WallTracks
 from .rods_at_walls import RodsAtWalls
 from .wall_times import FEWEST, MORE, MORE_TOGETHER, MOST
@@ -20,7 +21,6 @@ STEEPEST = 0.03  # slope of a wall against its stated direction
 USUAL = 0.7  # of the least fraction of near rods that touch another wall: as many touch a wall in its place
 FEWEST_WALLS, SAME_ANGLE = 3, 0.3  # walls that are turned by the same angle against the rods, within a part of it
 LOOSE = 3.0  # widths of touching with which its place is sought, before a robust line through the gaps (Theil and Sen)
-QUARTER_TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])  # of rows of vectors, anticlockwise
 STATED = (0.0, 0.0)  # place of a wall as it is stated
 
 
@@ -46,6 +46,12 @@ class _Gaps:
     def fraction(self, place: tuple[float, float]) -> float:
         """Fraction of the rods near a wall at some place that touch it."""
         return self.count(place) / max(self.count(place, within=self.near), 1)
+
+    def find_better(self, more: float) -> tuple[float, float] | None:
+        """Place at which so many times more rods touch the wall than as stated; None: there is none."""
+        place = self.find_place()
+        better = place is not None and self.count(place) >= max(more * self.count(STATED), FEWEST)
+        return place if better else None
 
     def find_place(self) -> tuple[float, float] | None:
         """Place beside the outermost rods at which most of them touch the wall; None where few are beside it."""
@@ -95,39 +101,41 @@ def correct_wall_places(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, 
     """
     rods = RodsAtWalls.of(tracks)
     gaps = {w: _measure(rods, walls, w) for w in walls.straight}
-    touched = {w: each.fraction(STATED) for w, each in gaps.items() if each.fraction(STATED) > MOST}
+    stated = {w: each.fraction(STATED) for w, each in gaps.items()}
+    touched = [each for each in stated.values() if each > MOST]
     if not touched:
         return _move_together(walls, gaps, LOOSE * rods.width)
-    usual = min(MOST, USUAL * min(touched.values()))
+    usual = min(MOST, USUAL * min(touched))
     endpoints, words = walls.endpoints.copy(), []
     for w, each in gaps.items():
-        place = None if w in touched else each.find_place()
-        if place is None:
+        place = None if stated[w] > MOST else each.find_better(MORE)
+        if place is None or not each.fraction(place) > usual:
             continue
-        there, stated = each.count(place), each.count(STATED)
-        if there < max(MORE * stated, FEWEST) or not each.fraction(place) > usual:
-            continue
-        ends = place[0] + place[1] * each.length * np.array([-0.5, 0.5])  # at the ends
-        endpoints[:, w] -= ends[:, None] * outward_normals(walls.endpoints[:, w])[:, None]
-        words.append(f"{_describe(walls.name[w], ends)}: {there} rods touch it in its right place, {stated} as stated")
+        distance, slope = place
+        endpoints[:, w : w + 1] = move_walls(endpoints[:, w : w + 1], np.array([-distance]), np.array([slope]))
+        wrong = _describe(walls.name[w], distance, slope * each.length)
+        there, given = each.count(place), each.count(STATED)
+        words.append(f"{wrong}: {there} rods touch it in its right place, {given} as stated")
     return (replace(walls, endpoints=endpoints), "; ".join(words)) if words else (walls, "")
 
 
 def _move_together(walls: WallTracks, gaps: Mapping[int, _Gaps], most: float) -> tuple[WallTracks, str]:
     """Move all walls by the turn and shift that straight ones share against the rods, up to a distance `most` [m]."""
-    place = {w: found for w, each in gaps.items() if (found := _place_of_more(each)) is not None}
+    place = {w: found for w, each in gaps.items() if (found := each.find_better(MORE_TOGETHER)) is not None}
     inside, slope = np.array(list(place.values())).reshape(-1, 2).T
     if len(place) < FEWEST_WALLS or not np.ptp(slope) < SAME_ANGLE * abs(angle := float(np.median(slope))):
         return walls, ""
+    along, across = np.cos(angle), np.sin(angle)
+    turn = np.array([[along, across], [-across, along]])  # of points as rows
     ends = walls.endpoints[:, list(place)].mean(axis=0)
     normal, middle = outward_normals(ends), ends.mean(axis=1)
     centre = middle.mean(axis=0)
-    turned = angle * np.einsum("ij,ij->i", (middle - centre) @ QUARTER_TURN, normal)  # outwards
-    shift = np.linalg.lstsq(normal, -inside - turned)[0]
-    if np.abs(normal @ shift + turned + inside).max() > most:
+    turned_normal = normal @ turn
+    # From the right place of each middle to the turned one, along the turned normal: what a shift must undo.
+    away = np.einsum("ij,ij->i", (middle - centre) @ turn - (middle - centre) + inside[:, None] * normal, turned_normal)
+    shift = np.linalg.lstsq(turned_normal, -away)[0]
+    if np.abs(turned_normal @ shift + away).max() > most:
         return walls, ""
-    along, across = np.cos(angle), np.sin(angle)
-    turn = np.array([[along, across], [-across, along]])  # of points as rows
     moved = centre + shift + (walls.endpoints - centre) @ turn
     there, stated = sum(gaps[w].count(each) for w, each in place.items()), sum(gaps[w].count(STATED) for w in place)
     return replace(walls, endpoints=moved), (
@@ -136,16 +144,9 @@ def _move_together(walls: WallTracks, gaps: Mapping[int, _Gaps], most: float) ->
     )
 
 
-def _place_of_more(gaps: _Gaps) -> tuple[float, float] | None:
-    """Place of a wall at which many more rods touch it than as stated; None: there is none."""
-    place = gaps.find_place()
-    many = place is not None and gaps.count(place) >= max(MORE_TOGETHER * gaps.count(STATED), FEWEST)
-    return place if many else None
-
-
-def _describe(name: str, ends: Array) -> str:
-    """Describe the right places [m] of both ends of a wall, as far inside of the stated ones."""
-    inside, turned = 1e3 * float(ends.mean()), 1e3 * float(np.ptp(ends))
+def _describe(name: str, distance: float, rise: float) -> str:
+    """Describe a wall whose right place is a distance [m] inside the stated one, and rises [m] from end to end."""
+    inside, turned = 1e3 * distance, 1e3 * abs(rise)
     wrong = (
         [f"{abs(inside):.2g} mm too far {'outside' if inside > 0.0 else 'inside'}"] if turned < 4 * abs(inside) else []
     )
