@@ -68,7 +68,7 @@ def detect_rods(image: Image, settings: DetectionSettings | None = None) -> Dete
     """
     settings = settings if settings is not None else DetectionSettings()
     found = detect_grains(image, settings)
-    if not settings.radii and settings.radius_range is None and not _are_plain(image, found):
+    if not settings.radii and not _are_plain(image, found):
         found = _prefer_larger(image, found, settings)
     search: MissedGrainSearch | None = None
     radii, odd = _sizes(found.radius, settings)
@@ -113,9 +113,11 @@ def _find_larger(image: Image, found: Detection, settings: DetectionSettings) ->
     area = np.cumsum(radius**2)
     parts = SMALL_AREA if len(radius) >= FEWEST else ()
     smallest = [SMALLER * float(radius[np.searchsorted(area, part * area[-1])]) for part in parts]
+    low, high = settings.radius_range or (MIN_RADIUS, np.inf)
     for least in dict.fromkeys(smallest):
-        if least > MIN_RADIUS and (radius < least).mean() >= MANY:
-            larger = detect_grains(image, replace(settings, radius_range=(least, LARGER * float(radius[-1]))))
+        if least > low and (radius < least).mean() >= MANY:
+            ends = least, min(LARGER * float(radius[-1]), high)
+            larger = detect_grains(image, replace(settings, radius_range=ends))
             if float(np.sum(larger.radius**2)) > area[-1]:
                 return larger
     return None

@@ -81,17 +81,18 @@ def find_common_sizes(radius: Float[Array, " n"]) -> tuple[Float[Array, " q"], B
 
     Notes
     -----
-    Groups as of `group_readings` that have at least 2 % of the grains and a range of at most 0.12 of their mean, at
-    most four of them, with at least 0.9 of all grains together.
+    A size is the mean of the readings within 0.06 of the median of a group as of `group_readings`, if these are 2 % of
+    all or more. There are at most four, with at least 0.9 of all grains together.
     """
     if len(radius) < MIN_GRAINS:
         return None
     sizes, other = [], np.ones(len(radius), np.bool_)
     for group in _split(radius):
-        mean = float(radius[group].mean())
-        if len(group) >= RARE * len(radius) and np.ptp(radius[group]) <= MAX_RANGE * mean:
-            sizes.append(mean)
-            other[group] = False
+        middle = float(np.median(radius[group]))
+        near = group[np.abs(radius[group] - middle) <= 0.5 * MAX_RANGE * middle]
+        if len(near) >= RARE * len(radius):
+            sizes.append(float(radius[near].mean()))
+            other[near] = False
     return (np.array(sizes), other) if len(sizes) <= MAX_SIZES and other.mean() <= 1.0 - COMMON else None
 
 

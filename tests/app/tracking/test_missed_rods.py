@@ -194,3 +194,5 @@ def test_dots_of_black_paint_are_no_rods() -> None:
     away, _ = KDTree(np.column_stack([rods.x, rods.y])).query(np.column_stack([found.x, found.y]))
     assert away.max() < 1.0
     assert len(detect_rods(np.full_like(image, 20.0)).x) == 0
+    within = detect_rods(image, DetectionSettings(radius_range=(5.0, 60.0)))  # as `init` looks for them
+    assert within.count == rods.count
