@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import partial
 
@@ -9,6 +10,7 @@ import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.special import j1
 
 from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
@@ -20,6 +22,9 @@ from ..correlation.splines import shrink
 MIN_COARSE_RADIUS = 10.0
 COARSE_RADIUS = 20.0
 PEAK_ERROR = 1.5  # greatest error of a circle's centre [px of the shrunk photograph]
+
+CIRCLE_SD = 0.8  # blur of a circle [px of the shrunk photograph]
+WAVE_NUMBERS = 2**14  # of the table of a circle's spectrum
 
 # Greatest number of pixels on which several radii are searched for at a time, to save memory.
 PARALLEL_PIXELS = 12_000_000
@@ -70,9 +75,9 @@ def find_circles(image: Image, radii: Array, *, min_score: float, finest: bool =
     found = []
     for factor in np.unique(factors):
         slopes = _slopes(shrink(image, int(factor)), int(tile_size(float(radii.max())) / factor))
-        searches = [
-            partial(_peaks, *slopes, float(radius), int(factor), min_score) for radius in radii[factors == factor]
-        ]
+        some = radii[factors == factor]
+        circles = _CircleSlopes(*slopes, float(some.max()) / factor)
+        searches = [partial(_peaks, circles, float(radius), int(factor), min_score) for radius in some]
         found += parallel_map(searches, None if slopes[0].size < PARALLEL_PIXELS else 1)
     table = np.concatenate(found)
     # A mean over a longer circle is more significant at the same value.
@@ -80,9 +85,9 @@ def find_circles(image: Image, radii: Array, *, min_score: float, finest: bool =
     return Circles(*table.T)
 
 
-def _peaks(slope_x: Image, slope_y: Image, radius: float, factor: int, min_score: float) -> Array:
+def _peaks(circles: _CircleSlopes, radius: float, factor: int, min_score: float) -> Array:
     """Return x, y, radius, score, error (c, 5) of the candidates of one radius [px of the photograph]."""
-    score = _ring_response(slope_x, slope_y, radius / factor)
+    score = circles.mean(radius / factor)
     peak = (score == cv2.dilate(score, np.ones((5, 5), np.uint8))) & (score > min_score)
     row, column = np.nonzero(peak)
     place = [axis * factor + 0.5 * (factor - 1) for axis in (column, row)]
@@ -262,13 +267,44 @@ def _slopes(image: Image, tile: int) -> tuple[Image, Image]:
     return np.asarray(slope_x * cut, dtype=np.float32), np.asarray(slope_y * cut, dtype=np.float32)
 
 
-def _ring_response(slope_x: Image, slope_y: Image, radius: float) -> Image:
-    side = int(np.ceil(radius + 3.0))
-    y, x = np.mgrid[-side : side + 1, -side : side + 1].astype(np.float32)
-    distance = np.hypot(x, y)
-    weight = np.exp(-((distance - radius) ** 2) / (2.0 * 0.8**2))
-    weight /= weight.sum() * np.maximum(distance, 1.0)
-    border = cv2.BORDER_REPLICATE
-    response = cv2.filter2D(slope_x, cv2.CV_32F, weight * x, borderType=border)
-    response += cv2.filter2D(slope_y, cv2.CV_32F, weight * y, borderType=border)
-    return np.asarray(-response, dtype=np.float32)
+class _CircleSlopes:
+    """Mean inward slope along the circles of any radius around every pixel, from one transform of the slopes.
+
+    Notes
+    -----
+    The field of unit normals on a circle of radius r, blurred by σ, has the spectrum −i k/|k| J₁(|k| r) exp(−σ²|k|²/2)
+    where its integral over the circle is 1. Its product with the spectrum of the slopes is that of their mean.
+    """
+
+    def __init__(self, slope_x: Image, slope_y: Image, largest: float) -> None:
+        """Transform the slopes (H, W), continued by those of the border, for radii up to `largest` [px]."""
+        self._first = margin = math.ceil(largest + 4.0 * CIRCLE_SD)
+        self._shape = slope_x.shape
+        rows, columns = (cv2.getOptimalDFTSize(size + 2 * margin) for size in self._shape)
+        self._padded = rows, columns
+        k_y = 2.0 * np.pi * np.fft.fftfreq(rows).astype(np.float32)[:, None]
+        k_x = 2.0 * np.pi * np.fft.rfftfreq(columns).astype(np.float32)[None, :]
+        size = np.hypot(k_x, k_y)
+        along = self._transform(slope_x) * k_x
+        along += self._transform(slope_y) * k_y
+        along *= np.complex64(-1j) / np.maximum(size, np.finfo(np.float32).tiny)
+        self._along = along
+        greatest = float(size.max())
+        self._wave_numbers = np.linspace(0.0, greatest, WAVE_NUMBERS)
+        self._nearest = np.rint(size * ((WAVE_NUMBERS - 1) / greatest)).astype(np.int32)
+
+    def _transform(self, slope: Image) -> NDArray[np.complex64]:
+        above, left = self._first, self._first
+        below, right = (whole - size - self._first for whole, size in zip(self._padded, self._shape, strict=True))
+        padded = cv2.copyMakeBorder(slope, above, below, left, right, cv2.BORDER_REPLICATE)
+        return np.asarray(np.fft.rfft2(padded), np.complex64)
+
+    def mean(self, radius: float) -> Image:
+        """Return the mean (H, W) for circles of this radius [px]."""
+        wave_numbers = self._wave_numbers
+        spectrum = j1(radius * wave_numbers) * np.exp(-0.5 * (CIRCLE_SD * wave_numbers) ** 2)
+        product = self._along * spectrum.astype(np.float32)[self._nearest]
+        mean = np.fft.irfft2(product, self._padded)
+        height, width = self._shape
+        inside = mean[self._first : self._first + height, self._first : self._first + width]
+        return np.ascontiguousarray(inside, np.float32)
