@@ -11,13 +11,13 @@ import numpy as np
 
 from .experiment.config.experiment_file import ExperimentFile
 from .experiment.experiment import Experiment, GrainGuess, read_grain_guess
+from .inference.assumption_trials import inputs_as_used
 from .inference.diagnosis.data_quality import DataQuality, measure_data_quality
 from .inference.diagnosis.diagnose import diagnose
 from .inference.diagnosis.smoothed_tracks import EXPECTED_OF_SMOOTHED, LOW_OF_SMOOTHED
 from .inference.diagnosis.trial import PREDICTED_PHOTOGRAPHS, Trial, solve_trial
 from .inference.inference_settings import material_of, settings_of
 from .inference.inputs import Inputs
-from .inference.softness_trial import with_softness
 from .inference.solve_frames import InferenceObserver
 from .process.errors import UndeterminedError
 from .process.machine.linear_algebra import one_thread_each
@@ -146,7 +146,7 @@ def predict_accuracy(
         return Prediction(quality, None, NOT_PREDICTED_OF_ONE)
     inputs = Inputs(tracks, walls, material_of(config), settings_of(config))
     try:
-        inputs = with_softness(inputs)
+        inputs = inputs_as_used(inputs)
         trial = solve_trial(inputs, PREDICTED_PHOTOGRAPHS, InferenceObserver(progress))
         compared = trial is not None and trial.expected[0] < COMPARED
         given = solve_trial(inputs, observer=InferenceObserver(progress)) if compared else None

@@ -35,6 +35,7 @@ from ..solver.frame_forces import FrameForces, FrameStatus
 from ..solver.kinematics.sequence_kinematics import SequenceKinematics, measure_kinematics
 from ..solver.sequence.frames import solve_first_frame
 from ..solver.statistics.frame_statistics import FrameStatistics
+from .assumption_trials import correct_by_trial
 from .corrected_sequence import CorrectedSequence
 from .correction.correct_sequence import correct_sequence
 from .correction.friction import check_sequence_friction
@@ -44,7 +45,6 @@ from .diagnosis.smoothed_tracks import find_smoothing, limit_for_smoothing
 from .first_frame import estimate_first_frame
 from .frame_store import FrameStore, MemoryStore
 from .inputs import Inputs
-from .softness_trial import correct_by_trial
 from .solve_frames import InferenceObserver, solve_frames, summarise_frame, with_remarks
 
 FIRST_FRAME = "first photograph"  # stage in which the first frame is estimated from all others
@@ -70,8 +70,8 @@ def infer_sequence(
     store : FrameStore, optional
         Keeps solved frames; frames that it holds already are not solved again. Default: in memory.
     complete : bool
-        Whether all photographs are there. Without it the trial of softness, the estimate of the first frame from all
-        others, the friction check and the diagnosis are left out.
+        Whether all photographs are there. Without it the trials of assumptions, the estimate of the first frame from
+        all others, the friction check and the diagnosis are left out.
     diagnosis : sequence of Finding, optional
         Causes of wrong forces that are known; None: they are sought.
 

@@ -8,11 +8,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..solver.bodies.grains import Array
 from ..solver.bodies.rods import RodMaterial
 from ..solver.contacts.verdicts import Verdicts
 from ..solver.convex.friction_check import FrictionCheck
 from ..tracks import Tracks, WallTracks
 from .inference_settings import InferenceSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Stretching:
+    """Stretching of the picture that was removed from positions and walls."""
+
+    factor: Array  # (2,) by which x and y were multiplied
+    middle: Array  # (2,) [m] that stays in its place
+    evidence: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +35,15 @@ class Inputs:
     settings: InferenceSettings = field(default_factory=InferenceSettings)
     verdicts: Mapping[int, Verdicts] = field(default_factory=dict)  # of reviewers, by row of the frame
     placed: NDArray[np.bool_] | None = None  # (f, n) poses that are where somebody put them: no outliers
+
+    stretching: Stretching | None = None  # None: none was removed
+
+    def without(self, stretching: Stretching) -> Inputs:
+        """Remove a stretching of the picture."""
+        middle, factor = stretching.middle, stretching.factor
+        tracks = replace(self.tracks, position=middle + factor * (self.tracks.position - middle))
+        walls = replace(self.walls, endpoints=middle + factor * (self.walls.endpoints - middle))
+        return replace(self, tracks=tracks, walls=walls, stretching=stretching)
 
     def with_base_friction(self, coefficient: float) -> Inputs:
         """Fix the friction coefficient of the base, which is then not measured again."""

@@ -1,0 +1,171 @@
+"""Softness and stretchings that gaps do not decide are used where the forces then fit clearly better."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from rodsight.experiment.experiment import load_experiment
+from rodsight.inference import assumption_trials as module
+from rodsight.inference.assumption_trials import (
+    FITS_HARD,
+    FITS_STRETCHED,
+    HIDDEN_STRETCHING,
+    SHOWN,
+    correct_by_trial,
+    inputs_as_used,
+)
+from rodsight.inference.diagnosis.diagnose import diagnose
+from rodsight.inference.inputs import Inputs, Stretching
+from rodsight.synthetic.scenarios.scenario_folder import make_scenario
+
+from .scenarios import read_inputs
+
+MIDDLE = np.array([0.01, -0.02])
+
+
+@pytest.fixture
+def inputs(made_tracks) -> Inputs:
+    return read_inputs(load_experiment(made_tracks))
+
+
+@dataclass(frozen=True)
+class Sequence:
+    softness_hidden: bool = False
+    lens: SimpleNamespace | None = None
+    remark: str = "noise is larger than stated"
+
+
+@pytest.fixture
+def corrected(monkeypatch):
+    """Inputs that are corrected to a sequence which `hide` sets."""
+    used, sequences = [], [Sequence()]
+
+    def correct(inputs):
+        used.append(inputs)
+        return sequences[-1]
+
+    monkeypatch.setattr(module, "correct_sequence", correct)
+    return SimpleNamespace(inputs=used, hide=sequences.append)
+
+
+def stretching(*value: float, applied: bool = True) -> SimpleNamespace:
+    """A distortion of the camera that the gaps show."""
+    return SimpleNamespace(value=np.pad(value, (0, 10 - len(value))), applied=applied, middle=MIDDLE)
+
+
+def described(inputs: Inputs) -> str:
+    """Name an assumption."""
+    if inputs.stretching is None:
+        return "as given" if inputs.material.stiffness is None else "soft"
+    x, y = 100.0 * (inputs.stretching.factor - 1.0)
+    return f"x {x:+.2g} %" if y == 0.0 else f"y {y:+.2g} %"
+
+
+def solved(monkeypatch, expected: float, rises: dict[str, float]) -> list[str]:
+    """Let trials of the given input have this expected r, and those of others rise by so much; return what was solved."""
+    tried = []
+
+    def trial(inputs):
+        assert not inputs.settings.infer_unseen  # rods that no photograph shows
+        tried.append(described(inputs))
+        return SimpleNamespace(expected=(expected, 0.0, 1.0), score=1.0)
+
+    monkeypatch.setattr(module, "solve_trial", trial)
+    monkeypatch.setattr(module, "trial_score", lambda inputs: trial(inputs).score + rises.get(tried[-1], 0.0))
+    return tried
+
+
+HIDDEN = ["soft", "x -0.3 %", "y +0.3 %", "x +0.3 %", "y -0.3 %"]
+
+
+def test_soft_grains_that_fit_clearly_better_are_used(inputs, corrected, monkeypatch):
+    corrected.hide(Sequence(softness_hidden=True))
+    tried = solved(monkeypatch, 0.7, {"soft": SHOWN + 0.01, "x -0.3 %": SHOWN})
+    used, sequence = correct_by_trial(inputs)
+    assert used == replace(inputs, material=replace(inputs.material, stiffness="estimate"))
+    assert corrected.inputs == [inputs, used]
+    assert tried == ["as given", *HIDDEN]
+    assert sequence.remark.startswith("noise is larger than stated; overlaps are read as forces of soft grains, since")
+    assert "falls to 49 %" in sequence.remark
+    assert "rigid" in sequence.remark
+
+
+@pytest.mark.parametrize(("expected", "rise"), [(0.7, SHOWN - 0.01), (FITS_HARD + 0.001, 1.0)])
+def test_hard_grains_stay_hard_where_that_is_no_clear_gain_or_they_fit(inputs, corrected, monkeypatch, expected, rise):
+    corrected.hide(Sequence(softness_hidden=True))
+    solved(monkeypatch, expected, {"soft": rise})
+    used, _ = correct_by_trial(inputs)
+    assert used is inputs
+    assert corrected.inputs == [inputs]
+
+
+def test_the_axis_along_which_lengths_fit_better_is_rescaled(inputs, corrected, monkeypatch):
+    corrected.hide(Sequence(lens=stretching(-0.0025, -0.001)))
+    tried = solved(monkeypatch, FITS_STRETCHED - 0.001, {"x -0.5 %": 0.4, "y +0.5 %": 0.6})
+    used, sequence = correct_by_trial(inputs)
+    assert tried == ["as given", "x -0.5 %", "y +0.5 %"]
+    np.testing.assert_allclose(used.stretching.factor, [1.0, 1.005])
+    moved = used.tracks.position - MIDDLE, inputs.tracks.position - MIDDLE
+    np.testing.assert_allclose(moved[0], moved[1] * [1.0, 1.005])
+    np.testing.assert_allclose(used.walls.endpoints, MIDDLE + (inputs.walls.endpoints - MIDDLE) * [1.0, 1.005])
+    assert used.stretching.evidence.startswith("lengths along y are taken to be 0.5 % too short, since what the forces")
+    assert used.stretching.evidence.endswith("then falls to 30 %")
+    assert sequence.remark == f"noise is larger than stated; {used.stretching.evidence}"
+
+
+@pytest.mark.parametrize(
+    ("lens", "expected"),
+    [
+        (stretching(-0.0025, -0.001), FITS_STRETCHED + 0.001),
+        (stretching(0.0, 0.0), 0.5),
+        (stretching(-0.0025, -0.001, applied=False), 0.5),
+        (stretching(-0.0025, -0.001, 0.02), 0.5),  # a lens, too
+    ],
+)
+def test_other_distortions_and_forces_that_fit_are_not_compared(inputs, corrected, monkeypatch, lens, expected):
+    corrected.hide(Sequence(lens=lens))
+    solved(monkeypatch, expected, {"x -0.5 %": 2.0})
+    assert correct_by_trial(inputs)[0] is inputs
+
+
+def test_nothing_is_solved_where_gaps_hide_nothing(inputs, corrected, monkeypatch):
+    tried = solved(monkeypatch, 0.1, dict.fromkeys(HIDDEN, 2.0))
+    assert correct_by_trial(inputs)[0] is inputs
+    assert tried == []
+
+
+def test_a_trial_of_the_first_photographs_serves_all(inputs, corrected, monkeypatch):
+    corrected.hide(Sequence(softness_hidden=True))
+    solved(monkeypatch, 0.7, {"x -0.3 %": 1.0})
+    used = inputs_as_used(inputs)
+    factor = [1.0 - HIDDEN_STRETCHING, 1.0]
+    assert used.tracks.frame_count == inputs.tracks.frame_count
+    middle = used.stretching.middle
+    np.testing.assert_allclose(used.tracks.position - middle, (inputs.tracks.position - middle) * factor)
+
+
+def test_a_removed_stretching_is_named(inputs):
+    removed = inputs.without(Stretching(np.array([1.0, 1.0]), MIDDLE, "lengths along x are too long"))
+    found = [each for each in diagnose(removed, None, sliding=False) if each.cause == "stretched_picture"]
+    assert [(each.evidence, each.corrected) for each in found] == [("lengths along x are too long", True)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scenario", "soft"), [("softer_stretched", True), ("centres", False)])
+def test_only_soft_grains_are_recognised_behind_errors(tmp_path, scenario, soft):
+    inputs = read_inputs(load_experiment(make_scenario(tmp_path, scenario, 6, grains=120).folder))
+    used, sequence = correct_by_trial(inputs)
+    assert sequence.settings.soft is soft
+    assert (used is not inputs) <= soft
+
+
+@pytest.mark.slow
+def test_a_stretching_of_soft_grains_is_removed_along_its_axis(tmp_path):
+    inputs = read_inputs(load_experiment(make_scenario(tmp_path, "soft_stretched", 42, grains=120).folder))
+    used, sequence = correct_by_trial(inputs)
+    assert used.stretching.factor[0] == pytest.approx(1.0 / 1.003, abs=0.001)
+    assert used.stretching.factor[1] == 1.0
+    assert sequence.settings.soft
