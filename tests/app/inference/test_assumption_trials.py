@@ -65,7 +65,7 @@ def described(inputs: Inputs) -> str:
 
 
 def solved(monkeypatch, expected: float, rises: dict[str, float]) -> list[str]:
-    """Let trials of the given input have this expected r, and those of others rise by so much; return what was solved."""
+    """Let trials of the given input have this expected r, and others rise by so much; return what was solved."""
     tried = []
 
     def trial(inputs):
