@@ -13,26 +13,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..solver.calibration.calibrate import Calibration
-from ..solver.calibration.equations import rotate_offsets
-from ..solver.calibration.grain_errors import find_grain_errors
 from ..solver.contacts.verdicts import NO_VERDICTS
 from ..solver.frame_forces import FrameForces, FrameStatus
 from ..solver.mixture.fringe_evidence import calibrate_sequence_fringes
 from ..solver.mixture.position_estimates import PositionEstimates, frame_generator
 from ..solver.posterior.frame_posterior import FramePosterior, infer_frame
 from ..solver.posterior.sequence_evidence import SequenceEvidence
-from ..tracks import Tracks, WallTracks
 from .backward_pass import fuse_second_frame
 from .corrected_sequence import CorrectedSequence
-from .known_pairs import correct_grain_errors, gather_evidence_of, known_pairs, rows_of
+from .correction.hard_grain_errors import UNSOUND, errors_by_forces, size_of_errors, without_own_corrections
+from .known_pairs import correct_grain_errors, gather_evidence_of, rows_of
 from .snapshots import measure_sequence
 
 FRAMES = 16  # later frames that determine the errors; after more of them other contacts bear
-MIN_FRAMES = 2  # fewer frames do not determine the errors
-DETECTABLE = 0.5  # errors smaller than so many standard deviations of a position are left
-SEED = 1  # of the draws of the remaining errors
-UNSOUND = (FrameStatus.FAILED, FrameStatus.SUSPECT)
 
 
 def estimate_first_frame(
@@ -87,15 +80,14 @@ def _posterior_without_errors(sequence: CorrectedSequence, frames: Sequence[Fram
     calibration = sequence.calibration
     if calibration is None or 0 in sequence.failed:
         return None
-    rows, force = known_pairs([each for each in frames[1 : FRAMES + 1] if each.status not in UNSOUND])
-    if len(np.unique(rows.frame)) < MIN_FRAMES:
-        return None
-    given, walls = _without_own_corrections(sequence.tracks, sequence.walls, calibration), sequence.walls
-    centre, radius = _prior_errors(gather_evidence_of(sequence, given))
-    if centre == radius == 0.0:
+    given, walls = without_own_corrections(sequence.tracks, sequence.walls, calibration), sequence.walls
+    size = size_of_errors(gather_evidence_of(sequence, given))
+    if size == (0.0, 0.0):
         return None
     measured = measure_sequence(given, walls)
-    found = find_grain_errors(measured, rows, force, centre=centre, radius=radius, rng=np.random.default_rng(SEED))
+    found = errors_by_forces(measured, frames[1 : FRAMES + 1], size)
+    if found is None:
+        return None
     evidence = gather_evidence_of(sequence, correct_grain_errors(given, measured, found))
     contacts = evidence.of_frame(0, verdicts=sequence.verdicts.get(0, NO_VERDICTS)).contacts
     return _sample(sequence, evidence, found.gap_sd(measured, rows_of(0, contacts)))
@@ -113,21 +105,3 @@ def _sample(
         first = replace(first, gap_sd=gap_sd)
     settings = evidence.settings.for_isolated_frame()
     return infer_frame(first, settings, frame_generator(0), sequence.settings.workers)
-
-
-def _without_own_corrections(tracks: Tracks, walls: WallTracks, calibration: Calibration) -> Tracks:
-    """Restore every grain's own errors; corrections that all grains share stay."""
-    own = rotate_offsets(measure_sequence(tracks, walls), calibration.offset)
-    shared = calibration.shared_radius(tracks.radius - calibration.radius)
-    return replace(
-        tracks,
-        radius=tracks.radius - (calibration.radius - shared),
-        position=tracks.position - own,
-    )
-
-
-def _prior_errors(evidence: SequenceEvidence) -> tuple[float, float]:
-    """Standard deviations [m] of errors of centres and of radii; 0 where noise hides them."""
-    noise, least = evidence.noise.sigma, DETECTABLE * evidence.noise.sigma
-    centre = float(np.sqrt(max(float(np.median(evidence.centre_sd)) ** 2 - noise**2, 0.0)))
-    return centre if centre > least else 0.0, evidence.radius_sd if evidence.radius_sd > least else 0.0

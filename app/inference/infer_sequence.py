@@ -39,6 +39,7 @@ from .assumption_trials import correct_by_trial
 from .corrected_sequence import CorrectedSequence
 from .correction.correct_sequence import correct_sequence
 from .correction.friction import check_sequence_friction
+from .correction.hard_grain_errors import correct_hard_grains
 from .diagnosis.causes import uncorrected
 from .diagnosis.diagnose import diagnose_solved
 from .diagnosis.smoothed_tracks import find_smoothing, limit_for_smoothing
@@ -70,8 +71,8 @@ def infer_sequence(
     store : FrameStore, optional
         Keeps solved frames; frames that it holds already are not solved again. Default: in memory.
     complete : bool
-        Whether all photographs are there. Without it the trials of assumptions, the estimate of the first frame from
-        all others, the friction check and the diagnosis are left out.
+        Whether all photographs are there. Without it the trials of assumptions, the errors of hard rods by forces, the
+        estimate of the first frame from all others, the friction check and the diagnosis are left out.
     diagnosis : sequence of Finding, optional
         Causes of wrong forces that are known; None: they are sought.
 
@@ -88,6 +89,7 @@ def infer_sequence(
     observer = InferenceObserver() if observer is None else observer
     store = MemoryStore() if store is None else store
     inputs, sequence = correct_by_trial(inputs) if complete else (inputs, correct_sequence(inputs))
+    sequence = correct_hard_grains(sequence) if complete else sequence
     release_free_memory()  # of equations of all photographs
     observer.corrected(sequence)
     solve_frames(sequence, store, observer)

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numba
 import numpy as np
 import pytest
-from rodsight.inference.first_frame import _prior_errors, _without_own_corrections, estimate_first_frame
-from rodsight.inference.snapshots import measure_sequence
+from rodsight.inference.first_frame import estimate_first_frame
 from rodsight.solver.assessment.intervals.force_intervals import FIRST_SCALE
 from rodsight.solver.assessment.intervals.scale_sd import FIRST_BY_SECOND
-from rodsight.solver.calibration.equations import rotate_offsets
 from rodsight.solver.frame_forces import FrameStatus
 
 from tests.app.inference.scenarios import Solved, agreement, solve
@@ -92,33 +89,3 @@ def test_later_frames_make_the_first_more_accurate_despite_wrong_rods(tmp_path, 
     frame = solved.complete().frames[0]
     assert agreement(frame, solved.true[0]) > max(agreement(solved.frames[0], solved.true[0]) + 0.03, 0.86)
     assert frame.trust < agreement(frame, solved.true[0]) + 0.03
-
-
-def test_own_corrections_of_grains_are_taken_back_and_shared_ones_stay(wrong_centres):
-    sequence, given = wrong_centres.sequence, wrong_centres.inputs.tracks
-    calibration = sequence.calibration
-    assert calibration is not None
-    own = 1e-5 * np.random.default_rng(2).normal(size=given.grain_count)
-    moved = np.stack([own, 2.0 * own[::-1]], axis=1)
-    measured = measure_sequence(sequence.tracks, sequence.walls)
-    corrected = replace(
-        sequence.tracks,
-        radius=sequence.tracks.radius + own,
-        position=sequence.tracks.position + rotate_offsets(measured, moved),
-    )
-    other = replace(calibration, radius=calibration.radius + own, offset=calibration.offset + moved)
-    found = _without_own_corrections(corrected, sequence.walls, other)
-    before = _without_own_corrections(sequence.tracks, sequence.walls, calibration)
-    np.testing.assert_allclose(found.radius, before.radius, atol=1e-12)
-    np.testing.assert_allclose(found.position, before.position, atol=1e-12)
-    np.testing.assert_allclose(found.radius, given.radius + calibration.shared_radius(given.radius), atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("centre_sd", "radius_sd", "expected"), [(3e-5, 2e-5, (8e-10**0.5, 2e-5)), (1e-5, 4e-6, (0.0, 0.0))]
-)
-def test_errors_that_noise_hides_are_left(centre_sd, radius_sd, expected):
-    evidence = SimpleNamespace(
-        noise=SimpleNamespace(sigma=1e-5), centre_sd=np.array([0.0, centre_sd, 1.0]), radius_sd=radius_sd
-    )
-    assert _prior_errors(evidence) == pytest.approx(expected)
