@@ -44,6 +44,7 @@ class Evidence:
     scale_disagreement: float = math.nan
     inertial_number: float = math.nan  # of the step by the times of its photographs; NaN: no load is stated
     corrected_gap: float = 0.0  # [m] rms part of a gap that was corrected as errors of single grains
+    centres_by_forces: bool = False  # errors of centres were found again by the forces of the sequence
     loaded: bool = True  # by a known load, or by weight alone: see `Packing.is_loaded`
     sought: bool = False  # rods that no photograph shows were sought: holes that are left need none
     # Σ |ΣF|² of the grains over 2 Σ f_n², of the reported field: at least so much of the squared forces is missing

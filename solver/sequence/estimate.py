@@ -275,6 +275,7 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
         start_difference=estimate.start_difference,
         inferred=problem.sequence.inferred,
         corrected_gap=problem.settings.corrected_gap,
+        centres_by_forces=problem.settings.centres_by_forces,
         start_forgotten=estimate.members.start_forgotten,
         holes=len(find_holes(packing.grains, snapshot.position, snapshot.present, step.walls)),
         grains=int(snapshot.present.sum()),

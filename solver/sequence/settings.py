@@ -32,6 +32,7 @@ class SequenceSettings:
     soft: bool = False  # grains overlap by more than noise and errors: every frame uses positions
     measured_overlap: float = 0.0  # [m] mean overlap of soft grains by their gaps; 0: not visible
     corrected_gap: float = 0.0  # [m] rms part of a gap that was corrected as errors of single grains
+    centres_by_forces: bool = False  # errors of centres were found again by the forces of the sequence
     unseen_sought: bool = False  # rods that no photograph shows were sought: holes that are left need none
     soft_trust: float = MAX_TRUST_MEASURED  # largest trust in forces from their overlaps
     keep_members: bool = False  # ensemble: keep the field of every member

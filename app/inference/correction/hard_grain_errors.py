@@ -27,6 +27,7 @@ from ...tracks import Tracks, WallTracks
 from ..corrected_sequence import CorrectedSequence
 from ..known_pairs import correct_grain_errors, gather_evidence_of, known_pairs
 from ..snapshots import measure_sequence
+from .calibration import own_gap_error, radius_classes
 
 FRAMES = 12  # solved beforehand
 FEWEST = 2  # frames that determine the errors
@@ -38,7 +39,7 @@ UNSOUND = (FrameStatus.FAILED, FrameStatus.SUSPECT)
 
 
 def correct_hard_grains(sequence: CorrectedSequence) -> CorrectedSequence:
-    """Find the errors of hard rods by their forces where the motion shows little; elsewhere unchanged."""
+    """Find the errors of centres of hard rods by forces where the motion shows little; elsewhere unchanged."""
     calibration = sequence.calibration
     if calibration is None or sequence.settings.soft or not sequence.settings.uses_positions:
         return sequence
@@ -47,7 +48,7 @@ def correct_hard_grains(sequence: CorrectedSequence) -> CorrectedSequence:
         size = size_of_errors(gather_evidence_of(sequence, given))
     except ValueError:  # no two bodies are close
         return sequence
-    if size == (0.0, 0.0):
+    if not size[0] or size[1]:  # errors of radii look like forces of the same pairs: r rises and falls
         return sequence
     frames = _solve_first(sequence)
     if not mean_of_known(each.expected_correlation for each in frames[1:]) < FITS:
@@ -63,8 +64,11 @@ def correct_hard_grains(sequence: CorrectedSequence) -> CorrectedSequence:
         offsets.append(found.offset)
         radii.append(found.radius)
         mean = replace(found, offset=np.mean(offsets, axis=0), radius=np.mean(radii, axis=0))
+        own = _with_own_errors(calibration, shared, mean)
+        gap = own_gap_error(own, radius_classes(given.radius))
+        settings = replace(sequence.settings, corrected_gap=gap, centres_by_forces=True)
         corrected = sequence.with_tracks(correct_grain_errors(given, measured, mean))
-        better = replace(corrected, calibration=_with_own_errors(calibration, shared, mean))
+        better = replace(corrected, calibration=own, settings=settings)
     return better
 
 
