@@ -27,7 +27,6 @@ from ...tracks import Tracks, WallTracks
 from ..corrected_sequence import CorrectedSequence
 from ..known_pairs import correct_grain_errors, gather_evidence_of, known_pairs
 from ..snapshots import measure_sequence
-from .calibration import own_gap_error, radius_classes
 
 FRAMES = 12  # solved beforehand
 FEWEST = 2  # frames that determine the errors
@@ -65,8 +64,7 @@ def correct_hard_grains(sequence: CorrectedSequence) -> CorrectedSequence:
         radii.append(found.radius)
         mean = replace(found, offset=np.mean(offsets, axis=0), radius=np.mean(radii, axis=0))
         own = _with_own_errors(calibration, shared, mean)
-        gap = own_gap_error(own, radius_classes(given.radius))
-        settings = replace(sequence.settings, corrected_gap=gap, centres_by_forces=True)
+        settings = replace(sequence.settings, centres_by_forces=True)
         corrected = sequence.with_tracks(correct_grain_errors(given, measured, mean))
         better = replace(corrected, calibration=own, settings=settings)
     return better

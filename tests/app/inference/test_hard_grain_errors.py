@@ -20,6 +20,7 @@ from rodsight.inference.correction.hard_grain_errors import (
 from rodsight.inference.infer_sequence import infer_sequence
 from rodsight.inference.snapshots import measure_sequence
 from rodsight.solver.calibration.equations import rotate_offsets
+from rodsight.solver.calibration.grain_errors import GrainErrors
 from rodsight.solver.frame_forces import FrameStatus
 
 from tests.app.inference.scenarios import Solved, agreement, solve
@@ -56,6 +57,7 @@ def test_errors_are_found_anew_where_the_motion_shows_little(wrong_centres, unce
     assert solved[0] is sequence
     assert solved[1] is not sequence  # repeated with better forces
     assert found.calibration is not None
+    assert found.settings.centres_by_forces
     # Its own corrections are those of its tracks, so that the first frame takes them back.
     restored = without_own_corrections(found.tracks, found.walls, found.calibration)
     before = without_own_corrections(sequence.tracks, sequence.walls, sequence.calibration)
@@ -65,6 +67,26 @@ def test_errors_are_found_anew_where_the_motion_shows_little(wrong_centres, unce
     assert change.max() > 1e-6
     assert 0.0 < found.calibration.offset_sd.max() < 1e-4
     np.testing.assert_array_equal(found.packing.grains.radius, found.tracks.radius)
+
+
+def test_the_errors_are_the_mean_over_the_passes_and_the_calibration(wrong_centres, uncertain, monkeypatch):
+    uncertain(FITS - 0.01)
+    sequence = wrong_centres.sequence
+    n, number = sequence.packing.grains.count, iter((1.0, 3.0, 5.0, 7.0))
+
+    def find(measured, frames, size):
+        return GrainErrors(np.full((n, 2), 1e-6 * next(number)), np.zeros(n), 0.0, np.zeros((5, 3 * n)))
+
+    monkeypatch.setattr(module, "errors_by_forces", find)
+    found = correct_hard_grains(sequence)
+    np.testing.assert_allclose(found.calibration.offset, (sequence.calibration.offset + 16e-6) / (PASSES + 1))
+
+
+def test_errors_of_radii_are_left_to_calibration(wrong_centres, uncertain, monkeypatch):
+    solved = uncertain(FITS - 0.01)
+    monkeypatch.setattr(module, "size_of_errors", lambda evidence: (1e-5, 1e-5))
+    assert correct_hard_grains(wrong_centres.sequence) is wrong_centres.sequence
+    assert solved == []
 
 
 @pytest.mark.parametrize(

@@ -314,6 +314,17 @@ MUTANTS = [
         ("min(sequence.settings.soft_trust, MAX_TRUST_CORRECTED)", "sequence.settings.soft_trust"),
     ),
     *mutants_of(
+        "app/inference/correction/hard_grain_errors.py",
+        f"{TESTS}/test_hard_grain_errors.py",
+        ("if not size[0] or size[1]:", "if not size[0]:"),
+        ("each in frames[1:]) < FITS", "each in frames[1:]) < 1.0"),
+        ("_solve_first(better) if passed else frames", "frames"),
+        ("if each.status not in UNSOUND", "if True"),
+        ("offsets, radii = [calibration.offset],", "offsets, radii = [],"),
+        ("offset=found.offset, offset_sd", "offset_sd"),
+        ("centres_by_forces=True", "centres_by_forces=False"),
+    ),
+    *mutants_of(
         "app/inference/correction/unseen.py",
         f"{TESTS}/test_unseen.py",
         ("tracks.id.max() + 1 + np.arange(u)", "np.arange(u)"),
