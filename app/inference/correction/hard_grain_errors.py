@@ -67,7 +67,7 @@ def correct_hard_grains(sequence: CorrectedSequence) -> CorrectedSequence:
         settings = replace(sequence.settings, centres_by_forces=True)
         corrected = sequence.with_tracks(correct_grain_errors(given, measured, mean))
         better = replace(corrected, calibration=own, settings=settings)
-    return better
+    return better if better is sequence else _with_remark(better)
 
 
 def errors_by_forces(
@@ -120,6 +120,13 @@ def _solve_first(sequence: CorrectedSequence) -> list[FrameForces]:
         verdicts=sequence.verdicts, failed={k: why for k, why in sequence.failed.items() if k < FRAMES},
     )  # fmt: skip
     return [forces for forces, _ in solved]
+
+
+def _with_remark(sequence: CorrectedSequence) -> CorrectedSequence:
+    assert sequence.calibration is not None
+    size = 1e6 * float(np.sqrt(np.mean(sequence.calibration.offset**2)))
+    remark = f"errors of centres ({size:.0f} µm rms) were found again by the forces of the first photographs"
+    return replace(sequence, remark="; ".join(filter(None, (sequence.remark, remark))))
 
 
 def _with_own_errors(calibration: Calibration, shared: Array, found: GrainErrors) -> Calibration:

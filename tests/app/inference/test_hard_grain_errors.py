@@ -58,6 +58,7 @@ def test_errors_are_found_anew_where_the_motion_shows_little(wrong_centres, unce
     assert solved[1] is not sequence  # repeated with better forces
     assert found.calibration is not None
     assert found.settings.centres_by_forces
+    assert "µm rms) were found again by the forces of the first photographs" in found.remark
     # Its own corrections are those of its tracks, so that the first frame takes them back.
     restored = without_own_corrections(found.tracks, found.walls, found.calibration)
     before = without_own_corrections(sequence.tracks, sequence.walls, sequence.calibration)

@@ -144,9 +144,6 @@ MUTANTS = [
         "app/inference/first_frame.py",
         f"{TESTS}/test_first_frame.py",
         ("frames[1 : FRAMES + 1]", "frames[: FRAMES + 1]"),
-        ("radius=tracks.radius - (calibration.radius - shared)", "radius=tracks.radius"),
-        ("position=tracks.position - own", "position=tracks.position + own"),
-        ("- noise**2, 0.0)))\n", "- 4.0 * noise**2, 0.0)))\n"),
     ),
     *mutants_of(
         "app/inference/known_pairs.py",
@@ -323,6 +320,9 @@ MUTANTS = [
         ("offsets, radii = [calibration.offset],", "offsets, radii = [],"),
         ("offset=found.offset, offset_sd", "offset_sd"),
         ("centres_by_forces=True", "centres_by_forces=False"),
+        ("radius=tracks.radius - (calibration.radius - shared)", "radius=tracks.radius"),
+        ("position=tracks.position - own", "position=tracks.position + own"),
+        ("- noise**2, 0.0)))\n", "- 4.0 * noise**2, 0.0)))\n"),
     ),
     *mutants_of(
         "app/inference/correction/unseen.py",

@@ -76,7 +76,7 @@ def test_the_distance_of_the_bound_follows_the_score(monkeypatch):
         assert bound_correlation(each) == pytest.approx(math.tanh(0.8 * score - 0.1))
 
 
-def test_the_same_evidence_promises_more_where_errors_of_centres_were_found_by_forces():
+def test_the_same_evidence_counts_more_where_errors_of_centres_were_found_by_forces():
     found = replace(BOTH, centres_by_forces=True)
     assert correlation_score(found) == pytest.approx(correlation_score(BOTH) + CENTRES_BY_FORCES)
     assert bound_correlation(found) > bound_correlation(BOTH)
