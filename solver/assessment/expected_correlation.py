@@ -55,8 +55,8 @@ CORRECTED_NOISE = 1.2  # ε of a motion that is noise: at most 1.14 in simulated
 CONFIRMED_MARGIN = 0.05
 MOSTLY_OVERLAPS = 0.5  # weight of the position-only estimate of soft grains above which only its evidence counts
 CONTRADICTED: float = FITTED["expected_correlation"]["contradicted"]  # change of arctanh r where a cause is named
-# Of arctanh r where errors of centres were found by forces: the same evidence then comes with better ones. In four tests
-# of rods at rest (rising and stepped loads, 150 rods, seeds 60 and 61) arctanh r exceeds the table's by .08 to .38.
+# Of arctanh r where errors of centres were found by forces: the same evidence then comes with better ones. In four
+# tests of rods at rest (rising and stepped loads, 150 rods, seeds 60, 61) arctanh r exceeds the table's by .08 to .38.
 CENTRES_BY_FORCES = 0.15
 CERTAIN = 1.0 - 1e-9  # r up to which arctanh r is finite
 WIDEST: float = FITTED["expected_correlation"]["widest_gap_error"]  # gap error that simulated frames have reached
