@@ -59,7 +59,7 @@ CERTAIN = 1.0 - 1e-9  # r up to which arctanh r is finite
 WIDEST: float = FITTED["expected_correlation"]["widest_gap_error"]  # gap error that simulated frames have reached
 CLOSED: float = FITTED["expected_correlation"]["closed_overlap"]  # at which r is half of what other evidence shows
 # Fraction of `closed_overlap` that counts where errors of centres were found again by forces. In four tests of rods at
-# rest (rising and stepped loads, 150 rods, seeds 60 and 61) r is .80, .79, .92 and .90, and the expected one without this
+# rest (rising and stepped loads, 150 rods, seeds 60 and 61) r is .80, .79, .92 and .90, expected without this
 # fraction .77, .76, .83 and .81; with .5 the means are equal.
 CLOSED_BY_FORCES = 0.5
 BEST_EIGHTH = 1  # knot of a table: quantiles of the frames of the fit, an eighth apart
