@@ -95,10 +95,10 @@ def _soft(inputs: Inputs, sequence: CorrectedSequence) -> Iterator[_Assumption]:
 
 
 def _along_one_axis(inputs: Inputs, sequence: CorrectedSequence) -> Iterator[_Assumption]:
-    """Assume that x and y have different scales, and that one of them is as stated.
+    """Assume that x and y have different scales and that one of them is as stated, or that there is no stretching.
 
-    Where the gaps show a stretching, one of pixels that are not square is a part of it. Where errors may hide overlaps,
-    they hide such a small stretching, too.
+    Where the gaps show a stretching, one of pixels that are not square is a part of it, or overlaps are all of it.
+    Where errors may hide overlaps, they hide such a small stretching, too.
     """
     lens = sequence.lens
     if lens is None and sequence.softness_hidden:
@@ -107,6 +107,8 @@ def _along_one_axis(inputs: Inputs, sequence: CorrectedSequence) -> Iterator[_As
     elif lens is not None and lens.applied and lens.value[ANISOTROPY].any() and not lens.value[ANISOTROPY.stop :].any():
         middle = lens.middle
         sizes, fits = (2.0 * float(lens.value[ANISOTROPY.start]),), FITS_STRETCHED
+        words = "gaps that depend on the direction are read as forces, not as a stretched picture"
+        yield _Assumption(inputs.without(Stretching(np.ones(2), middle, words)), fits, words)
     else:
         return
     for size in sizes:

@@ -18,9 +18,9 @@ from .inference_settings import InferenceSettings
 
 @dataclass(frozen=True, slots=True)
 class Stretching:
-    """Stretching of the picture that was removed from positions and walls."""
+    """Stretching of the picture that was removed from positions and walls; no other distortion is sought then."""
 
-    factor: Array  # (2,) by which x and y were multiplied
+    factor: Array  # (2,) by which x and y were multiplied; ones: there is none
     middle: Array  # (2,) [m] that stays in its place
     evidence: str
 
@@ -36,7 +36,7 @@ class Inputs:
     verdicts: Mapping[int, Verdicts] = field(default_factory=dict)  # of reviewers, by row of the frame
     placed: NDArray[np.bool_] | None = None  # (f, n) poses that are where somebody put them: no outliers
 
-    stretching: Stretching | None = None  # None: none was removed
+    stretching: Stretching | None = None  # None: the gaps are to show it
 
     def without(self, stretching: Stretching) -> Inputs:
         """Remove a stretching of the picture."""

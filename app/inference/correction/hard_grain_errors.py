@@ -33,6 +33,7 @@ FEWEST = 2  # frames that determine the errors
 PASSES = 4
 FITS = 0.9  # expected r from which on the motion confirms what calibration did
 DETECTABLE = 0.5  # errors smaller than so many standard deviations of a position are left
+MOST_OF_RADII = 0.3  # greatest size of errors of radii over those of centres
 SEED = 1  # of the draws of the remaining errors
 UNSOUND = (FrameStatus.FAILED, FrameStatus.SUSPECT)
 
@@ -47,7 +48,7 @@ def correct_hard_grains(sequence: CorrectedSequence) -> CorrectedSequence:
         size = size_of_errors(gather_evidence_of(sequence, given))
     except ValueError:  # no two bodies are close
         return sequence
-    if not size[0] or size[1]:  # errors of radii look like forces of the same pairs: r rises and falls
+    if not size[1] < MOST_OF_RADII * size[0]:  # errors of radii look like forces of the same pairs: r rises and falls
         return sequence
     frames = _solve_first(sequence)
     if not mean_of_known(each.expected_correlation for each in frames[1:]) < FITS:

@@ -95,7 +95,7 @@ def diagnose(
     repeated = find_repeated(restored)
     restored = without_poses(restored, repeated)
     names = [finding("exchanged_ids", exchanged)] if exchanged else []
-    if inputs.stretching is not None:
+    if inputs.stretching is not None and (inputs.stretching.factor != 1.0).any():
         names.append(finding("stretched_picture", inputs.stretching.evidence, corrected=True))
     walls, failed = complete_walls(restored, inputs.walls)
     if len(failed) == restored.frame_count:

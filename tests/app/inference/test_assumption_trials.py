@@ -17,6 +17,8 @@ from rodsight.inference.assumption_trials import (
     correct_by_trial,
     inputs_as_used,
 )
+from rodsight.inference.correction import correct_sequence
+from rodsight.inference.diagnosis import distortion
 from rodsight.inference.diagnosis.diagnose import diagnose
 from rodsight.inference.inputs import Inputs, Stretching
 from rodsight.synthetic.scenarios.scenario_folder import make_scenario
@@ -61,6 +63,8 @@ def described(inputs: Inputs) -> str:
     if inputs.stretching is None:
         return "as given" if inputs.material.stiffness is None else "soft"
     x, y = 100.0 * (inputs.stretching.factor - 1.0)
+    if x == y == 0.0:
+        return "no stretching"
     return f"x {x:+.2g} %" if y == 0.0 else f"y {y:+.2g} %"
 
 
@@ -106,7 +110,7 @@ def test_the_axis_along_which_lengths_fit_better_is_rescaled(inputs, corrected, 
     corrected.hide(Sequence(lens=stretching(-0.0025, -0.001)))
     tried = solved(monkeypatch, FITS_STRETCHED - 0.001, {"x -0.5 %": 0.4, "y +0.5 %": 0.6})
     used, sequence = correct_by_trial(inputs)
-    assert tried == ["as given", "x -0.5 %", "y +0.5 %"]
+    assert tried == ["as given", "no stretching", "x -0.5 %", "y +0.5 %"]
     np.testing.assert_allclose(used.stretching.factor, [1.0, 1.005])
     moved = used.tracks.position - MIDDLE, inputs.tracks.position - MIDDLE
     np.testing.assert_allclose(moved[0], moved[1] * [1.0, 1.005])
@@ -114,6 +118,15 @@ def test_the_axis_along_which_lengths_fit_better_is_rescaled(inputs, corrected, 
     assert used.stretching.evidence.startswith("lengths along y are taken to be 0.5 % too short, since what the forces")
     assert used.stretching.evidence.endswith("then falls to 30 %")
     assert sequence.remark == f"noise is larger than stated; {used.stretching.evidence}"
+
+
+def test_gaps_that_depend_on_the_direction_may_be_forces(inputs, corrected, monkeypatch):
+    corrected.hide(Sequence(lens=stretching(-0.0025, -0.001)))
+    solved(monkeypatch, 0.9, {"no stretching": 0.5, "x -0.5 %": 0.4})
+    used, sequence = correct_by_trial(inputs)
+    np.testing.assert_allclose(used.tracks.position, inputs.tracks.position, rtol=1e-12)
+    assert "are read as forces, not as a stretched picture, since" in sequence.remark
+    assert diagnose(used, None, sliding=False) == diagnose(inputs, None, sliding=False)
 
 
 @pytest.mark.parametrize(
@@ -148,9 +161,17 @@ def test_a_trial_of_the_first_photographs_serves_all(inputs, corrected, monkeypa
 
 
 def test_a_removed_stretching_is_named(inputs):
-    removed = inputs.without(Stretching(np.array([1.0, 1.0]), MIDDLE, "lengths along x are too long"))
+    removed = inputs.without(Stretching(np.array([0.999, 1.0]), MIDDLE, "lengths along x are too long"))
     found = [each for each in diagnose(removed, None, sliding=False) if each.cause == "stretched_picture"]
     assert [(each.evidence, each.corrected) for each in found] == [("lengths along x are too long", True)]
+
+
+def test_no_other_distortion_is_sought_with_a_removed_stretching(inputs, monkeypatch):
+    monkeypatch.setattr(correct_sequence, "correct_camera", None)  # a call fails
+    monkeypatch.setattr(distortion, "correct_camera", None)
+    removed = inputs.without(Stretching(np.array([0.999, 1.0]), MIDDLE, "lengths along x are too long"))
+    assert correct_sequence.correct_sequence(removed).lens is None
+    assert not distortion.seeks_distortion(removed, removed.walls, {})
 
 
 @pytest.mark.slow

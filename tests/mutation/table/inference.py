@@ -301,6 +301,7 @@ MUTANTS = [
         ("best = others[int(np.argmax(rises))]", "best = others[0]"),
         ("and not lens.value[ANISOTROPY.stop :].any():", "and True:"),
         ("enumerate((size, -size))", "enumerate((-size, size))"),
+        ("Stretching(np.ones(2), middle, words)", "Stretching(1.01 * np.ones(2), middle, words)"),
     ),
     *mutants_of(
         "app/inference/correction/soft_grain_errors.py",
@@ -313,7 +314,7 @@ MUTANTS = [
     *mutants_of(
         "app/inference/correction/hard_grain_errors.py",
         f"{TESTS}/test_hard_grain_errors.py",
-        ("if not size[0] or size[1]:", "if not size[0]:"),
+        ("if not size[1] < MOST_OF_RADII * size[0]:", "if not size[0]:"),
         ("each in frames[1:]) < FITS", "each in frames[1:]) < 1.0"),
         ("_solve_first(better) if passed else frames", "frames"),
         ("if each.status not in UNSOUND", "if True"),
