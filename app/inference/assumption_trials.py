@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..process.progress import Progress, no_progress
 from ..solver.bodies.grains import Array
 from ..solver.boundary.camera_distortion import ANISOTROPY
 from .corrected_sequence import CorrectedSequence
@@ -53,8 +54,14 @@ def inputs_as_used(inputs: Inputs) -> Inputs:
     return replace(stretched, material=used.material)
 
 
-def correct_by_trial(inputs: Inputs) -> tuple[Inputs, CorrectedSequence]:
+def correct_by_trial(inputs: Inputs, progress: Progress = no_progress) -> tuple[Inputs, CorrectedSequence]:
     """Correct a sequence by the assumption that a trial shows to be right; also return the inputs used.
+
+    Parameters
+    ----------
+    inputs : Inputs
+    progress : callable
+        Called after every trial.
 
     Raises
     ------
@@ -67,7 +74,10 @@ def correct_by_trial(inputs: Inputs) -> tuple[Inputs, CorrectedSequence]:
     if trial is None:
         return inputs, sequence
     others = [each for each in others if trial.expected[0] < each.fits]
-    rises = [trial_score(_with_seen_rods(each.inputs)) - trial.score for each in others]
+    rises = []
+    for done, each in enumerate(others, start=1):
+        rises.append(trial_score(_with_seen_rods(each.inputs)) - trial.score)
+        progress("comparing assumptions", done, len(others))
     if not max(rises, default=0.0) > SHOWN:
         return inputs, sequence
     best = others[int(np.argmax(rises))]

@@ -88,8 +88,11 @@ def infer_sequence(
     """
     observer = InferenceObserver() if observer is None else observer
     store = MemoryStore() if store is None else store
-    inputs, sequence = correct_by_trial(inputs) if complete else (inputs, correct_sequence(inputs))
-    sequence = correct_hard_grains(sequence) if complete else sequence
+    if complete:
+        inputs, sequence = correct_by_trial(inputs, observer.progress)
+        sequence = correct_hard_grains(sequence, observer.progress)
+    else:
+        sequence = correct_sequence(inputs)
     release_free_memory()  # of equations of all photographs
     observer.corrected(sequence)
     solve_frames(sequence, store, observer)

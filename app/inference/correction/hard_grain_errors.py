@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...process.counts import mean_of_known
+from ...process.progress import Progress, no_progress
 from ...solver.bodies.grains import Array
 from ...solver.calibration.calibrate import Calibration
 from ...solver.calibration.equations import rotate_offsets
@@ -38,8 +39,15 @@ SEED = 1  # of the draws of the remaining errors
 UNSOUND = (FrameStatus.FAILED, FrameStatus.SUSPECT)
 
 
-def correct_hard_grains(sequence: CorrectedSequence) -> CorrectedSequence:
-    """Find the errors of centres of hard rods by forces where the motion shows little; elsewhere unchanged."""
+def correct_hard_grains(sequence: CorrectedSequence, progress: Progress = no_progress) -> CorrectedSequence:
+    """Find the errors of centres of hard rods by forces where the motion shows little; elsewhere unchanged.
+
+    Parameters
+    ----------
+    sequence : CorrectedSequence
+    progress : callable
+        Called after every pass.
+    """
     calibration = sequence.calibration
     if calibration is None or sequence.settings.soft or not sequence.settings.uses_positions:
         return sequence
@@ -68,6 +76,7 @@ def correct_hard_grains(sequence: CorrectedSequence) -> CorrectedSequence:
         settings = replace(sequence.settings, centres_by_forces=True)
         corrected = sequence.with_tracks(correct_grain_errors(given, measured, mean))
         better = replace(corrected, calibration=own, settings=settings)
+        progress("correcting centres", passed + 1, PASSES)
     return better if better is sequence else _with_remark(better)
 
 

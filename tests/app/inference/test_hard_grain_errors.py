@@ -123,7 +123,7 @@ def test_one_frame_does_not_determine_errors(wrong_centres):
 def test_forces_of_rods_at_rest_become_more_accurate(tmp_path, scenario, rise, monkeypatch):
     solved = solve(tmp_path, scenario, 43, grains=150)
     after = infer_sequence(solved.inputs)
-    monkeypatch.setattr("rodsight.inference.infer_sequence.correct_hard_grains", lambda sequence: sequence)
+    monkeypatch.setattr("rodsight.inference.infer_sequence.correct_hard_grains", lambda sequence, progress: sequence)
     before = infer_sequence(solved.inputs)
     r = np.array([[agreement(each, solved.true[each.frame]) for each in some.frames] for some in (before, after)])
     assert r[1].mean() > r[0].mean() + rise
