@@ -312,6 +312,12 @@ MUTANTS = [
         ("min(sequence.settings.soft_trust, MAX_TRUST_CORRECTED)", "sequence.settings.soft_trust"),
     ),
     *mutants_of(
+        "app/inference/correction/tables/rods_at_walls.py",
+        f"{TESTS}/tables/test_rods_at_walls.py",
+        ("max(noise, ROUGH * radius, _overlap(tracks, noise))", "max(noise, ROUGH * radius)"),
+        ("np.quantile(-touching, COVERED)", "np.quantile(touching, COVERED)"),
+    ),
+    *mutants_of(
         "app/inference/correction/hard_grain_errors.py",
         f"{TESTS}/test_hard_grain_errors.py",
         ("if not size[1] < MOST_OF_RADII * size[0]:", "if not size[0]:"),

@@ -9,10 +9,13 @@ from numpy.typing import NDArray
 
 from ....solver.bodies.grains import Array
 from ....solver.bodies.wall_shapes import behind_body, beside_wall, distance_from_walls
+from ....solver.boundary.touching_pairs import find_near_pairs
+from ....solver.even_subset import even_subset
 from ....tracks import Tracks, WallTracks
 
 NEAR = 1.0  # mean radius up to which the gap of a rod is looked at
 SIGMAS = 3.0  # standard deviations of a position up to which a gap is that of a contact
+FRAMES, COVERED = 4, 0.9  # photographs in which the overlaps of rods are read, and the part of them that is usual
 ROUGH = 2e-3  # mean radius, the same of rods whose radii are known no better
 
 
@@ -26,9 +29,10 @@ class RodsAtWalls:
 
     @classmethod
     def of(cls, tracks: Tracks) -> RodsAtWalls:
-        """Rods touch within three standard deviations of a position, or .002 mean radii."""
+        """Rods touch within three standard deviations of a position, .002 mean radii, or the overlaps between rods."""
         radius = float(tracks.radius.mean())
-        return cls(tracks, NEAR * radius, max(SIGMAS * float(np.nanmedian(tracks.position_sigma)), ROUGH * radius))
+        noise = SIGMAS * float(np.nanmedian(tracks.position_sigma))
+        return cls(tracks, NEAR * radius, max(noise, ROUGH * radius, _overlap(tracks, noise)))
 
     def beside(self, k: int, ends: Array) -> tuple[NDArray[np.intp], Array]:
         """Rods (m,) of photograph k that project onto a wall (2, 2), and their gaps from it (m,) [m]."""
@@ -56,3 +60,14 @@ class RodsAtWalls:
     def touching(self, k: int, rows: NDArray[np.intp], ends: Array) -> NDArray[np.bool_]:
         """Whether rods (m,) of photograph k touch a wall that has ends (t, 2, 2): (t, m)."""
         return np.abs(self.gaps(k, rows, ends[:, None])) < self.width
+
+
+def _overlap(tracks: Tracks, noise: float) -> float:
+    """Overlap [m] that nine of ten rods that touch each other do not exceed; noise: greatest gap [m] of such rods."""
+    gaps = [np.empty(0)]
+    for k in even_subset(tracks.frame_count, FRAMES):
+        position = np.where(tracks.present_in(k)[:, None], tracks.position[k], np.nan)
+        gap = find_near_pairs(position, tracks.radius, tracks.boundary).gap
+        gaps.append(gap[gap < noise])
+    touching = np.concatenate(gaps)
+    return float(np.quantile(-touching, COVERED)) if len(touching) else 0.0
