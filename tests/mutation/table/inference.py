@@ -299,9 +299,9 @@ MUTANTS = [
         ("default=0.0) > SHOWN:", "default=0.0) > 0.0:"),
         ("changed = correct_sequence(used)", "changed = sequence"),
         ("best = others[int(np.argmax(rises))]", "best = others[0]"),
-        ("and not lens.value[ANISOTROPY.stop :].any():", "and True:"),
+        ("or lens.value[ANISOTROPY.stop :].any():", "or False:"),
         ("enumerate((size, -size))", "enumerate((-size, size))"),
-        ("Stretching(np.ones(2), middle, words)", "Stretching(1.01 * np.ones(2), middle, words)"),
+        ("Stretching(np.ones(2), lens.middle, words)", "Stretching(1.01 * np.ones(2), lens.middle, words)"),
     ),
     *mutants_of(
         "app/inference/correction/soft_grain_errors.py",
