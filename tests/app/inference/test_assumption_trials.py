@@ -179,7 +179,7 @@ def test_only_soft_grains_are_recognised_behind_errors(tmp_path, scenario, soft)
 
 @pytest.mark.slow
 def test_a_stretching_of_soft_grains_is_removed_along_its_axis(tmp_path):
-    inputs = read_inputs(load_experiment(make_scenario(tmp_path, "soft_stretched", 42, grains=120).folder))
+    inputs = read_inputs(load_experiment(make_scenario(tmp_path, "soft_stretched", 42, grains=200).folder))
     used, sequence = correct_by_trial(inputs)
     assert used.stretching.factor[0] == pytest.approx(1.0 / 1.003, abs=0.001)
     assert used.stretching.factor[1] == 1.0
