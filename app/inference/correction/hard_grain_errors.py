@@ -1,4 +1,4 @@
-"""Errors of centres and radii of hard rods that hardly move, by the forces between them.
+"""Errors of centres of hard rods that hardly move, by the forces between them.
 
 Calibration corrects the gaps of all pairs that seem to touch. Where rods move, other pairs touch later, so that errors
 and gaps separate. Where they hardly move, gaps between rods that bear nothing are taken for errors, and errors for
@@ -23,11 +23,11 @@ from ...solver.calibration.gaps import MeasuredSequence
 from ...solver.calibration.grain_errors import GrainErrors, find_grain_errors
 from ...solver.frame_forces import FrameForces, FrameStatus
 from ...solver.posterior.sequence_evidence import SequenceEvidence
-from ...solver.sequence.frames import solve_sequence
 from ...tracks import Tracks, WallTracks
 from ..corrected_sequence import CorrectedSequence
 from ..known_pairs import correct_grain_errors, gather_evidence_of, known_pairs
 from ..snapshots import measure_sequence
+from .preliminary_forces import solve_first
 
 FRAMES = 12  # solved beforehand
 FEWEST = 2  # frames that determine the errors
@@ -58,14 +58,14 @@ def correct_hard_grains(sequence: CorrectedSequence, progress: Progress = no_pro
         return sequence
     if not size[1] < MOST_OF_RADII * size[0]:  # errors of radii look like forces of the same pairs: r rises and falls
         return sequence
-    frames = _solve_first(sequence)
+    frames = list(solve_first(sequence, FRAMES))
     if not mean_of_known(each.expected_correlation for each in frames[1:]) < FITS:
         return sequence
     measured, better = measure_sequence(given, sequence.walls), sequence
     shared = calibration.shared_radius(sequence.tracks.radius - calibration.radius)
     offsets, radii = [calibration.offset], [calibration.radius - shared]
     for passed in range(PASSES):
-        frames = _solve_first(better) if passed else frames
+        frames = list(solve_first(better, FRAMES)) if passed else frames
         found = errors_by_forces(measured, frames[1:], size)
         if found is None:
             break
@@ -122,14 +122,6 @@ def size_of_errors(evidence: SequenceEvidence) -> tuple[float, float]:
     noise, least = evidence.noise.sigma, DETECTABLE * evidence.noise.sigma
     centre = float(np.sqrt(max(float(np.median(evidence.centre_sd)) ** 2 - noise**2, 0.0)))
     return centre if centre > least else 0.0, evidence.radius_sd if evidence.radius_sd > least else 0.0
-
-
-def _solve_first(sequence: CorrectedSequence) -> list[FrameForces]:
-    solved = solve_sequence(
-        sequence.packing, sequence.snapshots[:FRAMES], sequence.settings.without_sweeps(),
-        verdicts=sequence.verdicts, failed={k: why for k, why in sequence.failed.items() if k < FRAMES},
-    )  # fmt: skip
-    return [forces for forces, _ in solved]
 
 
 def _with_remark(sequence: CorrectedSequence) -> CorrectedSequence:

@@ -8,7 +8,6 @@ found are subtracted, and the step is repeated with better forces.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
 
@@ -18,10 +17,10 @@ from ...solver.assessment.mixture_trust import MAX_TRUST_CORRECTED
 from ...solver.calibration.gaps import MeasuredSequence
 from ...solver.calibration.grain_errors import GrainErrors, find_grain_errors
 from ...solver.frame_forces import FrameForces, FrameStatus
-from ...solver.sequence.frames import solve_sequence
 from ..corrected_sequence import CorrectedSequence
 from ..known_pairs import correct_grain_errors, gather_evidence_of, known_pairs
 from ..snapshots import measure_sequence
+from .preliminary_forces import solve_first
 
 FRAMES = 8  # solved beforehand: enough for each rod to be pressed from several sides
 PRELIMINARY_FRAMES = 4  # after which the errors must be detectable …
@@ -62,7 +61,7 @@ def _find_errors(
     measured: MeasuredSequence, sequence: CorrectedSequence, error: float, least: float
 ) -> GrainErrors | None:
     """Find errors of this size [m] in the measured sequence; None where rods overlap by less than `least` [m]."""
-    solved = _solve_first(sequence)
+    solved = solve_first(sequence, FRAMES)
     frames = list(islice(solved, PRELIMINARY_FRAMES))
     force, found = _errors_by_forces(measured, frames, error)
     if found is not None and not _is_significant(found, PRELIMINARY_RATIO):
@@ -72,15 +71,6 @@ def _find_errors(
     return (
         found if found is not None and found.overlap * force > least and _is_significant(found, SIGNIFICANT) else None
     )
-
-
-def _solve_first(sequence: CorrectedSequence) -> Iterator[FrameForces]:
-    settings = sequence.settings.without_sweeps()
-    solved = solve_sequence(
-        sequence.packing, sequence.snapshots[:FRAMES], settings,
-        verdicts=sequence.verdicts, failed={k: why for k, why in sequence.failed.items() if k < FRAMES},
-    )  # fmt: skip
-    return (forces for forces, _ in solved)
 
 
 def _errors_by_forces(

@@ -39,11 +39,11 @@ def uncertain(wrong_centres, monkeypatch):
     solved = []
 
     def expect(expected: float, status: FrameStatus = FrameStatus.SETTLED):
-        def solve_first(sequence):
+        def solve_first(sequence, count):
             solved.append(sequence)
             return [replace(each, expected_correlation=expected, status=status) for each in wrong_centres.frames]
 
-        monkeypatch.setattr(module, "_solve_first", solve_first)
+        monkeypatch.setattr(module, "solve_first", solve_first)
         return solved
 
     return expect

@@ -322,7 +322,7 @@ MUTANTS = [
         f"{TESTS}/test_hard_grain_errors.py",
         ("if not size[1] < MOST_OF_RADII * size[0]:", "if not size[0]:"),
         ("each in frames[1:]) < FITS", "each in frames[1:]) < 1.0"),
-        ("_solve_first(better) if passed else frames", "frames"),
+        ("list(solve_first(better, FRAMES)) if passed else frames", "frames"),
         ("if each.status not in UNSOUND", "if True"),
         ("offsets, radii = [calibration.offset],", "offsets, radii = [],"),
         ("offset=found.offset, offset_sd", "offset_sd"),
