@@ -147,7 +147,7 @@ def predict_accuracy(
     inputs = Inputs(tracks, walls, material_of(config), settings_of(config))
     try:
         inputs = inputs_as_used(inputs)
-        trial = solve_trial(inputs, PREDICTED_PHOTOGRAPHS, InferenceObserver(progress))
+        trial = solve_trial(inputs, PREDICTED_PHOTOGRAPHS, InferenceObserver(progress), by_forces=True)
         compared = trial is not None and trial.expected[0] < COMPARED
         given = solve_trial(inputs, observer=InferenceObserver(progress)) if compared else None
         found = diagnose(inputs, given, progress)

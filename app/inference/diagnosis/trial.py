@@ -17,6 +17,7 @@ from ...solver.assessment.expected_correlation import correlation_score, expect_
 from ...solver.assessment.penalties import NO_PENALTY, Penalty, assess, find_penalties, most_by_intervals
 from ..correction.close_photographs import choose_span
 from ..correction.correct_sequence import correct_sequence
+from ..correction.hard_grain_errors import correct_hard_grains
 from ..frame_store import MemoryStore
 from ..inputs import Inputs
 from ..solve_frames import InferenceObserver, solve_frames
@@ -68,7 +69,12 @@ class Trial:
 
 @one_thread_each
 def solve_trial(
-    inputs: Inputs, photographs: int = TRIAL_PHOTOGRAPHS, observer: InferenceObserver | None = None, *, first: int = 0
+    inputs: Inputs,
+    photographs: int = TRIAL_PHOTOGRAPHS,
+    observer: InferenceObserver | None = None,
+    *,
+    first: int = 0,
+    by_forces: bool = False,
 ) -> Trial | None:
     """Solve the first photographs of a sequence as a run would.
 
@@ -82,6 +88,8 @@ def solve_trial(
         Receives the progress.
     first : int
         First photograph.
+    by_forces : bool
+        Whether errors of centres are found by forces where a run would. Rivals of the input are compared without it.
 
     Returns
     -------
@@ -91,8 +99,9 @@ def solve_trial(
     given, stride = select_window(inputs, photographs, first)
     if given.tracks.frame_count < 2:
         return None
-    store = MemoryStore()
-    solve_frames(correct_sequence(given), store, InferenceObserver() if observer is None else observer)
+    store, observer = MemoryStore(), InferenceObserver() if observer is None else observer
+    sequence = correct_sequence(given)
+    solve_frames(correct_hard_grains(sequence, observer.progress) if by_forces else sequence, store, observer)
     judged = store.frames[min(SETTLED, len(store.frames) - 1) :]
     judged = [each for each in judged if each.state.evidence.assessed]
     if not judged:

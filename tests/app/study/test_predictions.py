@@ -105,8 +105,8 @@ def test_photographs_that_show_everything_but_no_equilibrium_are_no_lack_of_phot
 def test_rival_inputs_are_compared_where_the_first_twelve_photographs_leave_them_open(monkeypatch, evidence, compared):
     solved, diagnosed = [], []
 
-    def solve(inputs, photographs=6, observer=None):
-        solved.append(photographs)
+    def solve(inputs, photographs=6, observer=None, *, by_forces=False):
+        solved.append((photographs, by_forces))
         return Trial((evidence,), photographs)
 
     monkeypatch.setattr(prediction, "Inputs", lambda *_: "inputs")
@@ -119,7 +119,8 @@ def test_rival_inputs_are_compared_where_the_first_twelve_photographs_leave_them
     monkeypatch.setattr(prediction, "COMPARED", 0.9)
     found = prediction.predict_accuracy("config", TRACKS, "walls")
     assert found.trial == Trial((evidence,), 12)
-    assert solved == ([12, 6] if compared else [12])
+    # The prediction corrects what a run corrects; rivals are compared with the input as it is.
+    assert solved == ([(12, True), (6, False)] if compared else [(12, True)])
     assert diagnosed == ([Trial((evidence,), 6)] if compared else [None])
     assert prediction.predict_accuracy("config", TRACKS, None) == Prediction(GOOD, None)
     assert len(diagnosed) == 1

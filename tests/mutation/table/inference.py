@@ -410,5 +410,6 @@ MUTANTS = [
         ("trial is not None and trial.expected[0] < COMPARED", "False"),
         ("if walls is None:", "if False:"),
         ("solve_trial(inputs, PREDICTED_PHOTOGRAPHS,", "solve_trial(inputs, 2,"),
+        ("by_forces=True", "by_forces=False"),
     ),
 ]

@@ -56,6 +56,16 @@ def test_frames_without_a_history_or_an_assessment_are_not_judged(inputs, monkey
     assert alone.evidence == (evidence[0],)
 
 
+def test_errors_of_centres_are_found_by_forces_on_request(inputs, monkeypatch) -> None:
+    solve_into(monkeypatch, [EVIDENCE])
+    found: list[object] = []
+    monkeypatch.setattr(module, "correct_hard_grains", lambda sequence, progress: found.append(sequence))
+    solve_trial(inputs)
+    assert found == []
+    solve_trial(inputs, by_forces=True)
+    assert len(found) == 1
+
+
 def test_a_window_holds_as_many_photographs_as_requested_at_its_step(inputs, monkeypatch) -> None:
     times = inputs.tracks.time
     part, step = select_window(inputs, 3, 2)
