@@ -8,18 +8,16 @@ a stretching in another direction and of another size than the true one.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..process.progress import Progress, no_progress
-from ..solver.bodies.grains import Array
 from ..solver.boundary.camera_distortion import ANISOTROPY
 from .corrected_sequence import CorrectedSequence
 from .correction.correct_sequence import correct_sequence
-from .diagnosis.trial import PREDICTED_PHOTOGRAPHS, select_window, solve_trial, trial_score
+from .diagnosis.trial import PREDICTED_PHOTOGRAPHS, remainder, select_window, solve_trial, trial_score
 from .inputs import Inputs, Stretching
 
 # Expected r from which on an assumption is not compared: forces that fit leave little to gain.
@@ -77,18 +75,16 @@ def correct_by_trial(inputs: Inputs, progress: Progress = no_progress) -> tuple[
     for done, each in enumerate(others, start=1):
         rises.append(trial_score(_with_seen_rods(each.inputs)) - trial.score)
         progress("comparing assumptions", done, len(others))
-    if not max(rises, default=0.0) > SHOWN:
+    rise = max(rises, default=0.0)
+    if not rise > SHOWN:
         return inputs, sequence
-    best = others[int(np.argmax(rises))]
-    left = f"what the forces leave unexplained then falls to {100.0 * math.exp(-2.0 * max(rises)):.0f} %"
-    used, stretching = best.inputs, best.inputs.stretching
-    if stretching is not None:
-        used = replace(used, stretching=replace(stretching, evidence=f"{best.words}, since {left}"))
-    remark = f"{best.words}, since {left}"
+    best = others[rises.index(rise)]
+    used, remark = best.inputs, f"{best.words}, since what the forces leave unexplained then falls to {remainder(rise)}"
+    if used.stretching is not None:
+        used = replace(used, stretching=replace(used.stretching, evidence=remark))
     if used.material.stiffness != inputs.material.stiffness:
         remark += ' (if grains are hard: material.stiffness = "rigid")'
-    changed = correct_sequence(used)
-    return used, replace(changed, remark="; ".join(filter(None, (changed.remark, remark))))
+    return used, correct_sequence(used).with_remark(remark)
 
 
 def _with_seen_rods(inputs: Inputs) -> Inputs:
@@ -112,11 +108,12 @@ def _along_one_axis(inputs: Inputs, sequence: CorrectedSequence) -> Iterator[_As
     lens = sequence.lens
     if lens is None or not lens.applied or not lens.value[ANISOTROPY].any() or lens.value[ANISOTROPY.stop :].any():
         return
-    words = "gaps that depend on the direction are read as forces, not as a stretched picture"
-    yield _Assumption(inputs.without(Stretching(np.ones(2), lens.middle, words)), FITS_STRETCHED, words)
+    unstretched = "gaps that depend on the direction are read as forces, not as a stretched picture"
+    others = [(np.ones(2), unstretched)]
     size = 2.0 * float(lens.value[ANISOTROPY.start])
     for axis, change in enumerate((size, -size)):
         length = "long" if change < 0.0 else "short"
         words = f"lengths along {'xy'[axis]} are taken to be {100.0 * abs(size):.2g} % too {length}"
-        factor: Array = np.where(np.arange(2) == axis, 1.0 + change, 1.0)
-        yield _Assumption(inputs.without(Stretching(factor, lens.middle, words)), FITS_STRETCHED, words)
+        others.append((np.where(np.arange(2) == axis, 1.0 + change, 1.0), words))
+    for factor, words in others:
+        yield _Assumption(inputs.without(Stretching(factor, lens.middle)), FITS_STRETCHED, words)

@@ -53,6 +53,10 @@ class CorrectedSequence:
         packing = replace(self.packing, grains=replace(self.packing.grains, radius=tracks.radius))
         return replace(self, tracks=tracks, packing=packing, snapshots=snapshots)
 
+    def with_remark(self, remark: str) -> CorrectedSequence:
+        """The sequence with another correction that the first frame reports."""
+        return replace(self, remark="; ".join(filter(None, (self.remark, remark))))
+
     def unsolved_results(self) -> Results:
         """Results without any frame."""
         return Results(

@@ -21,7 +21,7 @@ from ..solver.posterior.frame_posterior import FramePosterior, infer_frame
 from ..solver.posterior.sequence_evidence import SequenceEvidence
 from .backward_pass import fuse_second_frame
 from .corrected_sequence import CorrectedSequence
-from .correction.hard_grain_errors import UNSOUND, errors_by_forces, size_of_errors, without_own_corrections
+from .correction.errors_by_forces import UNSOUND, find_errors, size_of_errors, without_own_corrections
 from .known_pairs import correct_grain_errors, gather_evidence_of, rows_of
 from .snapshots import measure_sequence
 
@@ -85,12 +85,13 @@ def _posterior_without_errors(sequence: CorrectedSequence, frames: Sequence[Fram
     if size == (0.0, 0.0):
         return None
     measured = measure_sequence(given, walls)
-    found = errors_by_forces(measured, frames[1 : FRAMES + 1], size)
+    found = find_errors(measured, frames[1 : FRAMES + 1], size)
     if found is None:
         return None
-    evidence = gather_evidence_of(sequence, correct_grain_errors(given, measured, found))
+    errors, _ = found
+    evidence = gather_evidence_of(sequence, correct_grain_errors(given, measured, errors))
     contacts = evidence.of_frame(0, verdicts=sequence.verdicts.get(0, NO_VERDICTS)).contacts
-    return _sample(sequence, evidence, found.gap_sd(measured, rows_of(0, contacts)))
+    return _sample(sequence, evidence, errors.gap_sd(measured, rows_of(0, contacts)))
 
 
 def _sample(

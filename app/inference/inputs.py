@@ -22,7 +22,7 @@ class Stretching:
 
     factor: Array  # (2,) by which x and y were multiplied; ones: there is none
     middle: Array  # (2,) [m] that stays in its place
-    evidence: str
+    evidence: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +35,13 @@ class Inputs:
     settings: InferenceSettings = field(default_factory=InferenceSettings)
     verdicts: Mapping[int, Verdicts] = field(default_factory=dict)  # of reviewers, by row of the frame
     placed: NDArray[np.bool_] | None = None  # (f, n) poses that are where somebody put them: no outliers
-
     stretching: Stretching | None = None  # None: the gaps are to show it
+
+    @property
+    def seeks_distortion(self) -> bool:
+        """Whether a distortion of the camera is sought."""
+        boundary = self.settings.boundary
+        return boundary is not None and boundary.camera and self.stretching is None
 
     def without(self, stretching: Stretching) -> Inputs:
         """Remove a stretching of the picture."""

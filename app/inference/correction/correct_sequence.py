@@ -81,7 +81,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
             material, remarks["softness"] = assume_softness(material, tracks, walls, failed)
         tracks, remarks["size_classes"] = use_size_classes(material, tracks)
     if settings.boundary is not None:
-        if settings.boundary.camera and inputs.stretching is None:
+        if inputs.seeks_distortion:
             tracks, walls, remarks["camera"], lens = correct_camera(
                 material, tracks, walls, failed, radii_known=settings.radii_are_known
             )

@@ -9,7 +9,6 @@ the mean over the passes and the calibration depends less on them than the last 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -18,25 +17,16 @@ from ...process.counts import mean_of_known
 from ...process.progress import Progress, no_progress
 from ...solver.bodies.grains import Array
 from ...solver.calibration.calibrate import Calibration
-from ...solver.calibration.equations import rotate_offsets
-from ...solver.calibration.gaps import MeasuredSequence
-from ...solver.calibration.grain_errors import GrainErrors, find_grain_errors
-from ...solver.frame_forces import FrameForces, FrameStatus
-from ...solver.posterior.sequence_evidence import SequenceEvidence
-from ...tracks import Tracks, WallTracks
+from ...solver.calibration.grain_errors import GrainErrors
 from ..corrected_sequence import CorrectedSequence
-from ..known_pairs import correct_grain_errors, gather_evidence_of, known_pairs
+from ..known_pairs import correct_grain_errors, gather_evidence_of
 from ..snapshots import measure_sequence
-from .preliminary_forces import solve_first
+from .errors_by_forces import find_errors, size_of_errors, solve_first, without_own_corrections
 
 FRAMES = 12  # solved beforehand
-FEWEST = 2  # frames that determine the errors
 PASSES = 4
 FITS = 0.9  # expected r from which on the motion confirms what calibration did
-DETECTABLE = 0.5  # errors smaller than so many standard deviations of a position are left
 MOST_OF_RADII = 0.3  # greatest size of errors of radii over those of centres
-SEED = 1  # of the draws of the remaining errors
-UNSOUND = (FrameStatus.FAILED, FrameStatus.SUSPECT)
 
 
 def correct_hard_grains(sequence: CorrectedSequence, progress: Progress = no_progress) -> CorrectedSequence:
@@ -63,72 +53,25 @@ def correct_hard_grains(sequence: CorrectedSequence, progress: Progress = no_pro
         return sequence
     measured, better = measure_sequence(given, sequence.walls), sequence
     shared = calibration.shared_radius(sequence.tracks.radius - calibration.radius)
+    again = replace(sequence, settings=replace(sequence.settings, centres_by_forces=True))
     offsets, radii = [calibration.offset], [calibration.radius - shared]
     for passed in range(PASSES):
         frames = list(solve_first(better, FRAMES)) if passed else frames
-        found = errors_by_forces(measured, frames[1:], size)
+        found = find_errors(measured, frames[1:], size)
         if found is None:
             break
-        offsets.append(found.offset)
-        radii.append(found.radius)
-        mean = replace(found, offset=np.mean(offsets, axis=0), radius=np.mean(radii, axis=0))
-        own = _with_own_errors(calibration, shared, mean)
-        settings = replace(sequence.settings, centres_by_forces=True)
-        corrected = sequence.with_tracks(correct_grain_errors(given, measured, mean))
-        better = replace(corrected, calibration=own, settings=settings)
+        errors, _ = found
+        offsets.append(errors.offset)
+        radii.append(errors.radius)
+        mean = replace(errors, offset=np.mean(offsets, axis=0), radius=np.mean(radii, axis=0))
+        better = again.with_tracks(correct_grain_errors(given, measured, mean))
+        better = replace(better, calibration=_with_own_errors(calibration, shared, mean))
         progress("correcting centres", passed + 1, PASSES)
-    return better if better is sequence else _with_remark(better)
-
-
-def errors_by_forces(
-    measured: MeasuredSequence, frames: Iterable[FrameForces], size: tuple[float, float]
-) -> GrainErrors | None:
-    """Find the errors of grains from the gaps of pairs that surely bear.
-
-    Parameters
-    ----------
-    measured : MeasuredSequence
-        Without corrections of single grains.
-    frames : iterable of FrameForces
-        Those that are suspect are left out.
-    size : (float, float)
-        As of `size_of_errors`.
-
-    Returns
-    -------
-    GrainErrors or None
-        None: fewer than two frames, which do not determine them.
-    """
-    rows, force = known_pairs(each for each in frames if each.status not in UNSOUND)
-    if len(np.unique(rows.frame)) < FEWEST:
-        return None
-    centre, radius = size
-    return find_grain_errors(measured, rows, force, centre=centre, radius=radius, rng=np.random.default_rng(SEED))
-
-
-def without_own_corrections(tracks: Tracks, walls: WallTracks, calibration: Calibration) -> Tracks:
-    """Restore every grain's own errors; corrections that all grains share stay."""
-    own = rotate_offsets(measure_sequence(tracks, walls), calibration.offset)
-    shared = calibration.shared_radius(tracks.radius - calibration.radius)
-    return replace(
-        tracks,
-        radius=tracks.radius - (calibration.radius - shared),
-        position=tracks.position - own,
-    )
-
-
-def size_of_errors(evidence: SequenceEvidence) -> tuple[float, float]:
-    """Standard deviations [m] of errors of centres and of radii; 0 where noise hides them."""
-    noise, least = evidence.noise.sigma, DETECTABLE * evidence.noise.sigma
-    centre = float(np.sqrt(max(float(np.median(evidence.centre_sd)) ** 2 - noise**2, 0.0)))
-    return centre if centre > least else 0.0, evidence.radius_sd if evidence.radius_sd > least else 0.0
-
-
-def _with_remark(sequence: CorrectedSequence) -> CorrectedSequence:
-    assert sequence.calibration is not None
-    size = 1e6 * float(np.sqrt(np.mean(sequence.calibration.offset**2)))
-    remark = f"errors of centres ({size:.0f} µm rms) were found again by the forces of the first photographs"
-    return replace(sequence, remark="; ".join(filter(None, (sequence.remark, remark))))
+    if better is sequence:
+        return sequence
+    rms = 1e6 * float(np.sqrt(np.mean(np.mean(offsets, axis=0) ** 2)))
+    errors_found = f"errors of centres ({rms:.0f} µm rms)"
+    return better.with_remark(f"{errors_found} were found again by the forces of the first photographs")
 
 
 def _with_own_errors(calibration: Calibration, shared: Array, found: GrainErrors) -> Calibration:

@@ -15,12 +15,12 @@ import numpy as np
 
 from ...solver.assessment.mixture_trust import MAX_TRUST_CORRECTED
 from ...solver.calibration.gaps import MeasuredSequence
-from ...solver.calibration.grain_errors import GrainErrors, find_grain_errors
+from ...solver.calibration.grain_errors import GrainErrors
 from ...solver.frame_forces import FrameForces, FrameStatus
 from ..corrected_sequence import CorrectedSequence
-from ..known_pairs import correct_grain_errors, gather_evidence_of, known_pairs
+from ..known_pairs import correct_grain_errors, gather_evidence_of
 from ..snapshots import measure_sequence
-from .preliminary_forces import solve_first
+from .errors_by_forces import centre_error, find_errors, solve_first
 
 FRAMES = 8  # solved beforehand: enough for each rod to be pressed from several sides
 PRELIMINARY_FRAMES = 4  # after which the errors must be detectable …
@@ -30,7 +30,6 @@ PASSES = 2
 DETECTABLE = 0.8  # errors below so many standard deviations of a position are left
 SIGNIFICANT = 1.0  # size of the errors over their standard deviation: .4 to .6 for rods with exact radii
 MIN_OVERLAP = 2.5  # mean overlap over the noise below which overlap is no evidence
-SEED = 1  # of the draws of standard deviations
 
 
 def correct_soft_grains(sequence: CorrectedSequence) -> CorrectedSequence:
@@ -42,7 +41,7 @@ def correct_soft_grains(sequence: CorrectedSequence) -> CorrectedSequence:
     except ValueError:  # no two bodies are close
         return sequence
     noise = evidence.noise.sigma
-    error = float(np.sqrt(max(float(np.median(evidence.centre_sd)) ** 2 - noise**2, 0.0)))
+    error = centre_error(evidence)
     if error < DETECTABLE * noise:
         return sequence
     measured = measure_sequence(sequence.tracks, sequence.walls)
@@ -63,26 +62,23 @@ def _find_errors(
     """Find errors of this size [m] in the measured sequence; None where rods overlap by less than `least` [m]."""
     solved = solve_first(sequence, FRAMES)
     frames = list(islice(solved, PRELIMINARY_FRAMES))
-    force, found = _errors_by_forces(measured, frames, error)
-    if found is not None and not _is_significant(found, PRELIMINARY_RATIO):
+    found = _errors_by_forces(measured, frames, error)
+    if found is not None and not _is_significant(found[0], PRELIMINARY_RATIO):
         return None
     frames += solved
-    force, found = _errors_by_forces(measured, frames, error)
-    return (
-        found if found is not None and found.overlap * force > least and _is_significant(found, SIGNIFICANT) else None
-    )
+    found = _errors_by_forces(measured, frames, error)
+    if found is None:
+        return None
+    errors, force = found
+    return errors if errors.overlap * force > least and _is_significant(errors, SIGNIFICANT) else None
 
 
 def _errors_by_forces(
     measured: MeasuredSequence, frames: list[FrameForces], error: float
-) -> tuple[float, GrainErrors | None]:
-    """Mean force [N] and the errors that forces determine; None of too few frames."""
+) -> tuple[GrainErrors, float] | None:
+    """Errors that forces determine, and the mean force [N]; None of too few frames."""
     # No motion leads to the first frame: its forces rest on the gaps themselves.
-    rows, force = known_pairs(each for each in frames[1:] if each.status is not FrameStatus.FAILED)
-    if len(np.unique(rows.frame)) < FEWEST:
-        return 0.0, None
-    rng = np.random.default_rng(SEED)
-    return float(force.mean()), find_grain_errors(measured, rows, force, centre=error, radius=error, rng=rng)
+    return find_errors(measured, frames[1:], (error, error), fewest=FEWEST, left_out=(FrameStatus.FAILED,))
 
 
 def _is_significant(found: GrainErrors, least: float) -> bool:

@@ -45,7 +45,7 @@ from .resistance import examine_resistance
 from .rivals import rivals_of
 from .sections import examine_sections
 from .smoothed_tracks import examine_smoothing
-from .trial import TRIAL_PHOTOGRAPHS, Trial, select_window, solve_trial, trial_score
+from .trial import TRIAL_PHOTOGRAPHS, Trial, remainder, select_window, solve_trial, trial_score
 
 # Rise of arctanh r that a rival must reach over the given input, and over all other causes. On correct input, and where
 # the model lacks physics that no rival has, the highest rise was 0.13 (seed 40, six scenarios).
@@ -173,7 +173,7 @@ def _compare_rivals(
     best = _clearest_cause(rise)
     if best and best not in excluded:
         gain, words = rise[best]
-        evidence = f"if {words}, what the forces leave unexplained falls to {_remainder(gain)}"
+        evidence = f"if {words}, what the forces leave unexplained falls to {remainder(gain)}"
         return [finding(best, evidence, corrected=False)]  # a run has removed what it could
     worst = trial.worst
     contradicted = bool(worst.words) and not worst.little_known
@@ -249,8 +249,3 @@ def _clearest_cause(rise: dict[str, tuple[float, str]]) -> str:
         return ""
     clear = len(order) == 1 or rise[order[0]][0] - rise[order[1]][0] > AHEAD
     return order[0] if clear else ""
-
-
-def _remainder(gain: float) -> str:
-    """1 − r of the rival over that of the input, for a rise of arctanh r: about exp(−2 rise)."""
-    return f"{100.0 * math.exp(-2.0 * gain):.0f} %"

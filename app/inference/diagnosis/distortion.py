@@ -37,8 +37,7 @@ def undistorted(
 
 def seeks_distortion(inputs: Inputs, walls: WallTracks, failed: Collection[int]) -> bool:
     """Whether a run looks for a distortion of the camera in the gaps between rods, and no overlaps hide it."""
-    boundary = inputs.settings.boundary
-    if boundary is None or not boundary.camera or walls.cell is not None or inputs.stretching is not None:
+    if not inputs.seeks_distortion or walls.cell is not None:
         return False
     return walls.count > 0 or not _overlaps_are_forces(inputs, walls, failed)
 

@@ -127,6 +127,11 @@ def trial_score(inputs: Inputs, first: int = 0) -> float:
     return -math.inf if trial is None else trial.score
 
 
+def remainder(gain: float) -> str:
+    """1 − r of the rival over that of the input, for a rise of arctanh r: about exp(−2 rise)."""
+    return f"{100.0 * math.exp(-2.0 * gain):.0f} %"
+
+
 def _kept(evidence: Evidence) -> float:
     """Fraction of the expected correlation that is left by penalties outside of the fitted model."""
     expected = expect_correlation(evidence)

@@ -16,6 +16,7 @@ from rodsight.inference.assumption_trials import (
     correct_by_trial,
     inputs_as_used,
 )
+from rodsight.inference.corrected_sequence import CorrectedSequence
 from rodsight.inference.correction import correct_sequence
 from rodsight.inference.diagnosis import distortion
 from rodsight.inference.diagnosis.diagnose import diagnose
@@ -37,6 +38,7 @@ class Sequence:
     softness_hidden: bool = False
     lens: SimpleNamespace | None = None
     remark: str = "noise is larger than stated"
+    with_remark = CorrectedSequence.with_remark
 
 
 @pytest.fixture

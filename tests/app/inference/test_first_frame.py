@@ -13,17 +13,11 @@ from rodsight.solver.assessment.intervals.force_intervals import FIRST_SCALE
 from rodsight.solver.assessment.intervals.scale_sd import FIRST_BY_SECOND
 from rodsight.solver.frame_forces import FrameStatus
 
-from tests.app.inference.scenarios import Solved, agreement, solve
+from tests.app.inference.scenarios import agreement, solve
 
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
 
-RODS = 70
 KNOWN_ERRORS = "errors of its grains' centres and radii are known"
-
-
-@pytest.fixture(scope="module")
-def wrong_centres(tmp_path_factory: pytest.TempPathFactory) -> Solved:
-    return solve(tmp_path_factory.mktemp("scenario"), "centres", 5, grains=RODS)
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment, read_tracks
 from rodsight.inference.corrected_sequence import CorrectedSequence
-from rodsight.inference.correction import preliminary_forces, soft_grain_errors
+from rodsight.inference.correction import errors_by_forces, soft_grain_errors
 from rodsight.inference.correction.soft_grain_errors import correct_grain_errors, correct_soft_grains
 from rodsight.solver.assessment.mixture_trust import MAX_TRUST_CORRECTED
 from rodsight.solver.calibration.grain_errors import GrainErrors
@@ -82,7 +82,7 @@ def test_the_preliminary_solution_stops_where_the_first_frames_show_no_errors(tm
             solved.append(each[0].frame)
             yield each
 
-    monkeypatch.setattr(preliminary_forces, "solve_sequence", counted)
+    monkeypatch.setattr(errors_by_forces, "solve_sequence", counted)
     sequence, stated, _ = corrected(tmp_path, "soft", 1, 150)
     assert solved == list(range(soft_grain_errors.PRELIMINARY_FRAMES))
     np.testing.assert_array_equal(sequence.tracks.radius, stated)

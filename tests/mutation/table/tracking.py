@@ -7,6 +7,14 @@ TESTS = f"tests/{REGISTRATION}"
 
 MUTANTS = [
     *mutants_of(
+        "app/tracking/detection/rings.py",
+        "tests/app/tracking/detection/test_rings.py",
+        ("np.complex64(-1j)", "np.complex64(1j)"),
+        ("* np.exp(-0.5 * (CIRCLE_SD * wave_numbers) ** 2)", ""),
+        ("left, right, cv2.BORDER_REPLICATE", "left, right, cv2.BORDER_CONSTANT"),
+        ("along += self._transform(slope_y) * k_y", "along += self._transform(slope_y) * k_x"),
+    ),
+    *mutants_of(
         f"{REGISTRATION}/consistency.py",
         f"{TESTS}/test_consistency.py",
         ("6.0 * median_deviation", "60.0 * median_deviation"),
