@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 from ..experiment.experiment import Experiment, GrainGuess
 from ..experiment.photographs import Photographs
 from ..experiment.pictures.image import Image, ImageSelection
-from ..experiment.plausibility import rim_points
+from ..experiment.plausibility import neighbour_spacing, rim_points
 from ..solver.bodies.grains import Array
 from ..solver.boundary.size_classes import find_common_sizes
 from ..solver.even_subset import even_subset
 from ..solver.robust_scale import SD_OVER_MAD
-from .detection.detect import MIN_RADIUS, TOUCHING, Detection, DetectionSettings, MissedGrainSearch, detect_grains
+from .detection.detect import MIN_RADIUS, Detection, DetectionSettings, MissedGrainSearch, detect_grains
+from .detection.judge_circles import TOUCHING
 from .detection.rings import beside
 
 SMALLEST = 0.05  # quantile of the radii below which nothing is looked for
@@ -44,6 +45,7 @@ SMALL_AREA, SMALLER, MANY = (0.3, 0.15, 0.05), 0.85, 0.02
 # Standard deviation within circles over the contrast of the photograph, below which they are plain; of so many of them.
 PLAIN, LOOKED_AT = 0.1, 200
 LARGER = 1.5  # greatest radius that is looked for instead, over the largest found
+WIDE_RIMS = 0.03  # of the sum of two radii: soft discs overlap by less under any load
 ROUNDS = 8  # of the search: every rod that is found shows the places beside it better
 
 
@@ -64,17 +66,37 @@ def detect_rods(image: Image, settings: DetectionSettings | None = None) -> Dete
     Near places that look like rods, circles of the known sizes are searched for once more at full resolution: on a
     shrunk copy coarse paint hides the rims. They must pass the tests of all others and look like rods. Unknown sizes
     are those of nearly all rods that were found; without distinct sizes nothing is added. Circles of other sizes may
-    be paint: those that a rod of these sizes covers are left out.
+    be paint: those that a rod of these sizes covers are left out, unless the rods are plain.
+
+    The rims of thick discs show their sides as well. Where neighbours would overlap by `WIDE_RIMS` by their rims, all
+    radii are reduced until they touch.
     """
     settings = settings if settings is not None else DetectionSettings()
     found = detect_grains(image, settings)
-    if not settings.radii and not _are_plain(image, found):
-        found = _prefer_larger(image, found, settings)
+    if settings.radii:
+        return _with_missed(image, found, settings, plain=False)
+    plain = _are_plain(image, found)
+    found = found if plain else _prefer_larger(image, found, settings)
+    return _reduced_to_touch(_with_missed(image, found, settings, plain=plain))
+
+
+def _reduced_to_touch(found: Detection) -> Detection:
+    """Reduce radii by one factor until neighbours touch, where their outlines overlap by far."""
+    spacing = neighbour_spacing(np.column_stack([found.x, found.y]), found.radius)
+    middle = float(np.median(spacing)) if len(spacing) >= FEWEST else 1.0
+    return replace(found, radius=found.radius * middle) if middle < 1.0 - WIDE_RIMS else found
+
+
+def _with_missed(image: Image, found: Detection, settings: DetectionSettings, *, plain: bool) -> Detection:
+    """Add the rods that were missed, and leave out circles that may be their paint."""
     search: MissedGrainSearch | None = None
     radii, odd = _sizes(found.radius, settings)
     if len(radii) == 0:
         return found
-    found, others = found.select(~odd), found.select(odd)
+    if not plain:
+        found, others = found.select(~odd), found.select(odd)
+    else:
+        others = found.select(np.zeros(found.count, np.bool_))
     for _ in range(ROUNDS):
         places = find_missed_rods(image, found.x, found.y, found.radius)
         if len(places) == 0:

@@ -212,7 +212,7 @@ def _detect(
         detection = refine_given(first, guess.x, guess.y, guess.radius)
         if section.follow == "outline":  # dark discs are given as well
             dark = refine_given(np.float32(FULL_SCALE) - first, guess.x, guess.y, guess.radius)
-            detection = max(detection, dark, key=lambda found: float(found.quality @ found.radius))
+            detection = max(detection, dark, key=lambda found: found.seen_area)
         centres = np.stack([detection.x, detection.y], axis=1)
         # The user measured the radius on this photograph, so it contains the lens distortion.
         return ReferenceGrains(guess.id, detection, detection.radius * scale.size_at(centres))
@@ -225,7 +225,7 @@ def _detect(
     if section.follow == "outline":
         # Dark discs on a light background are detected as well.
         dark = detect_rods(np.float32(FULL_SCALE) - first, settings)
-        detection = max(detection, dark, key=lambda found: float(found.quality @ found.radius))
+        detection = max(detection, dark, key=lambda found: found.seen_area)
         detection = add_missing_discs(first, detection)
     centres = np.stack([detection.x, detection.y], axis=1)
     within = _inside_walls(scale.to_world(centres), walls) if walls is not None else None

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from rodsight.tracking.correlation.splines import spline_coefficients
-from rodsight.tracking.detection.circle_kernels import lowest_tenth, measure_circles
+from rodsight.tracking.detection.circles.circle_kernels import lowest_tenth, measure_circles
 
 from tests.reference.twins.circles import measured
 

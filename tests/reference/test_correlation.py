@@ -13,7 +13,7 @@ from rodsight.tracking.correlation.noise import image_noise
 from rodsight.tracking.correlation.search import angles_to_try, disc_offsets, search_patch
 from rodsight.tracking.correlation.search_parts import search_parts
 from rodsight.tracking.correlation.splines import spline_coefficients
-from rodsight.tracking.detection.edges import sample_rays
+from rodsight.tracking.detection.circles.edges import sample_rays
 from rodsight.tracking.interpolation.projections import project_cubic, project_quintic
 from rodsight.tracking.interpolation.recursive_filter import quintic_coefficients
 from rodsight.tracking.interpolation.spline_values import interpolate_cubic, interpolate_quintic

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from rodsight.tracking.detection.circles.edges import centre_variance, find_steepest
+from rodsight.tracking.detection.circles.rim_profile import locate_edges, write_normal
 from rodsight.tracking.detection.discs import find_highest, measure_distances
-from rodsight.tracking.detection.edges import centre_variance, find_steepest
-from rodsight.tracking.detection.rim_profile import locate_edges, write_normal
 from rodsight.tracking.detection.rings import without_overlap
 from rodsight.tracking.short_sort import median, select
 from scipy.ndimage import distance_transform_edt, maximum_filter

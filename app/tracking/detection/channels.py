@@ -23,7 +23,7 @@ MIN_RADIUS = 7.0
 
 
 # Ratio of the score by which another channel or dark discs must be better than light discs in grey.
-BETTER = 1.05
+BETTER = 1.1
 FEWEST_DISCS = 8
 # Range of the grey levels over the noise, below which a channel shows nothing: of noise alone it is 4.1.
 LEAST_CONTRAST, CONTRAST_PERCENTILES = 8.0, (2.0, 98.0)
@@ -48,7 +48,7 @@ class View:
 def compare_views(channels: Mapping[str, Image], settings: DetectionSettings) -> list[View]:
     """Compare the channels of a photograph, each with light and dark discs, on a small copy; the best view first.
 
-    A view other than light discs in grey is only put first where its score is 1.05 times as large. Circles of noise are
+    A view other than light discs in grey is only put first where its score is 1.1 times as large. Circles of noise are
     found in every view, but they are small.
     """
     size = next(iter(channels.values())).size
@@ -66,7 +66,7 @@ def compare_views(channels: Mapping[str, Image], settings: DetectionSettings) ->
             continue  # noise has circles everywhere
         for dark in (False, True):
             found = detect_grains(np.float32(FULL_SCALE) - copy if dark else copy, small)
-            views.append(View(name, dark, found.count, float(found.quality @ found.radius), _size_range(found, factor)))
+            views.append(View(name, dark, found.count, found.seen_area, _size_range(found, factor)))
     usual = views[0].score
     return sorted(views, key=lambda view: -view.score if view.score > BETTER * usual else -usual - (view is views[0]))
 

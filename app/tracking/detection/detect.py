@@ -18,13 +18,12 @@ from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
 from ...solver.robust_scale import SD_OVER_MAD
 from ..correlation.edge_width import SharpCopy, sharpest_copy
-from .circle_measurement import CircleMeasurer, MeasuredCircle
-from .discs import OVERLAP, Discs, find_discs
-from .rings import Circles, beside, find_circles, not_overlapping, without_overlap
+from .circles.circle_measurement import CircleMeasurer, MeasuredCircle
+from .discs import find_discs
+from .faint_grains import CLEAR, find_faint_grains
+from .judge_circles import CLEAN_QUALITY, TOUCHING, judge_circles, judge_discs, rough_circles, search_window
+from .rings import beside, find_circles, radius_steps
 
-# Least half width of the search for the edges of a ring [px], whose centre has an error of that size or larger.
-RING_UNCERTAINTY = 3.0
-SMALL_FRACTION = 0.2  # greatest error of a small circle's centre, as a fraction of its radius
 ROUGH_SIGMA = 0.15  # [px] standard deviation of the error that a narrow gap adds to the steepest points' centre
 
 # Greatest standard deviation of a centre [px], or as a fraction of the radius, of any circle and of a small one.
@@ -39,29 +38,21 @@ RADIUS_RANGE = (8.0, 160.0)
 LARGEST_FRACTION = 0.3
 
 MIN_RADIUS = 4.0  # [px] least default one of bright discs, which at smaller sizes are like paint and noise
-# Discs that cover this fraction of a photograph's bright area are its grains, with the second as a factor of the least
-# quality.
-CLEAN_COVER, CLEAN_QUALITY = 0.93, 0.6
+# Discs that cover this fraction of a photograph's bright area are its grains.
+CLEAN_COVER = 0.93
 MAX_LIGHT_RANGE = 0.2  # greatest range of the light on such discs, as a fraction of the contrast: more is texture
-# Least covered fraction of the bright area that found grains leave, a part of which is always without shape.
-CLEAN_COVER_REST = 0.8
-DISC_PASSES = 4
-# Fraction of the bright area left, below which all grains are found.
-MAX_BRIGHT_LEFT = 0.01
 
 LEAST_ON_COPY = 8.0  # [px] least radius on a copy of a soft photograph: smaller ones are not shrunk any further
-SCAN_STEP = 1.06  # ratio of successive radii in the search for circles of unknown radius
 
-# Fractions of an outline that are seen: of a circle that is certain, and of one that may be accidental, of which noise
-# shows a third.
-CLEAR, FAINT, FEWEST_CLEAR = 0.55, 0.35, 20
+# Fraction of an outline that is seen of a circle that may be accidental, of which noise shows a third, and the least
+# number of clear circles by which such a one is judged.
+FAINT, FEWEST_CLEAR = 0.35, 20
 
 # Search for missed grains: least slope along a ring at full resolution, where coarse paint shows no slope on a shrunk
 # copy; greatest overlap of such a ring with a found grain before it is measured, as a fraction of the smaller radius;
 # distance of its centre from a place [radii]; found grains by which blur and shading of the rims are known; greatest
 # relative difference of a measured radius from the size.
 FINE_SCORE, FINE_OVERLAP, NEAR_PLACE, REFERENCE_GRAINS, SAME_SIZE = 0.08, 0.1, 3.0, 60, 0.05
-TOUCHING = 0.15  # greatest overlap of touching grains, as a fraction of the smaller radius
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +85,11 @@ class Detection:
     @property
     def count(self) -> int:
         return len(self.x)
+
+    @property
+    def seen_area(self) -> float:
+        """Area of the grains over π, weighted by the visible part of their outlines [px²]."""
+        return float(self.quality @ self.radius**2)
 
     def select(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Detection:
         """Return some of the grains, or all in another order."""
@@ -145,9 +141,7 @@ def _on_photograph(found: Detection, copy: SharpCopy, classes: tuple[float, ...]
 def _detect(image: Image, settings: DetectionSettings) -> Detection:
     known = bool(settings.radii)
     radii = (
-        np.array(sorted(set(settings.radii)))
-        if known
-        else _radius_steps(settings.radius_range or _default_range(image))
+        np.array(sorted(set(settings.radii))) if known else radius_steps(settings.radius_range or _default_range(image))
     )
     smallest = MIN_RADIUS if settings.radius_range is None else settings.radius_range[0]
     measurer = CircleMeasurer(image, float(radii.max()))
@@ -157,17 +151,19 @@ def _detect(image: Image, settings: DetectionSettings) -> Detection:
         # Without paint a small part of an outline suffices, and gaps may be arbitrarily narrow.
         measurer.plain = True
         first_discs = whole if smallest <= MIN_RADIUS else None
-        table, complete = _judge_discs(measurer, table, smallest, CLEAN_QUALITY * settings.min_quality, first_discs)
+        table, complete = judge_discs(measurer, table, smallest, CLEAN_QUALITY * settings.min_quality, first_discs)
     if not complete:
         rough = find_circles(image, radii, min_score=settings.min_score)
-        table = _judge(measurer, rough, table, known, settings.min_quality)
+        table = judge_circles(measurer, rough, table, known, settings.min_quality)
         count = len(table)
         if not known:
             # Grains that were hidden by rings of their neighbours' outlines, or smaller than the range.
-            table, _ = _judge_discs(measurer, table, smallest, settings.min_quality)
+            table, _ = judge_discs(measurer, table, smallest, settings.min_quality)
         if len(table) > count and smallest < radii[0]:
-            rough = find_circles(image, _radius_steps((smallest, radii[0])), min_score=settings.min_score)
-            table = _judge(measurer, rough, table, known, settings.min_quality)
+            rough = find_circles(image, radius_steps((smallest, radii[0])), min_score=settings.min_score)
+            table = judge_circles(measurer, rough, table, known, settings.min_quality)
+        least = settings.min_score, settings.min_quality
+        measurer, table = find_faint_grains(image, measurer, table, settings.radii, least)
     found = _refine(measurer, table[:, 0], table[:, 1], table[:, 2], fixed_radius=known)
     order = np.lexsort((found.x, found.y))
     good = _measured_closely(found, settings.min_quality)
@@ -214,7 +210,7 @@ class MissedGrainSearch:
         away = KDTree(np.column_stack(copy.to_copy(*places.T))).query(np.column_stack([rough.x, rough.y]))[0]
         near = rough.select(away < NEAR_PLACE * rough.radius)
         near = near.select(beside(np.column_stack([near.x, near.y, near.radius]), old, allowed=FINE_OVERLAP))
-        table = _judge(self._measurer, near, np.empty((0, 4)), True, least)
+        table = judge_circles(self._measurer, near, np.empty((0, 4)), True, least)
         table = table[beside(table[:, :3], old, allowed=TOUCHING)]
         reference = old[:: max(len(old) // REFERENCE_GRAINS, 1)]
         both = np.concatenate([table[:, :3], reference]) if len(table) else table[:, :3]
@@ -257,8 +253,8 @@ def refine_grains(image: Image, x: Array, y: Array, radius: Array, *, fixed_radi
 def _refine(measurer: CircleMeasurer, x: Array, y: Array, radius: Array, *, fixed_radius: bool) -> Detection:
     if len(x) == 0:
         return Detection(x, y, radius, np.empty(0), np.empty(0))
-    window = np.minimum([_window(each, True) for each in radius], 2.0)
-    first = [MeasuredCircle(*one) for one in measurer.measure(_rough(x, y, radius, window, np.inf)).tolist()]
+    window = np.minimum([search_window(each, True) for each in radius], 2.0)
+    first = [MeasuredCircle(*one) for one in measurer.measure(rough_circles(x, y, radius, window, np.inf)).tolist()]
     width = measurer.estimate_blur(first)
     rough = np.array([(*one.circle, one.sigma, one.quality) for one in first])
     free = _better(measurer, rough, measurer.measure_closely(_close(rough, 0.0, np.inf), width))
@@ -286,110 +282,6 @@ def _better(measurer: CircleMeasurer, rough: Array, close: Array) -> Array:
     return np.where(rougher[:, None], np.column_stack([rough[:, :3], sigma, rough[:, 4]]), close)
 
 
-def _judge_discs(
-    measurer: CircleMeasurer, table: Array, smallest: float, min_quality: float, first: Discs | None = None
-) -> tuple[Array, bool]:
-    """Add the discs that are grains to the table x, y, radius, quality (c, 4), in passes over the bright area left.
-
-    Discs that leave much of the bright area uncovered are no grains. first: the discs of the first pass, where they are
-    known. Returns also whether hardly any bright area remains.
-    """
-    level = measurer.level
-    whole, left = 0.0, np.inf
-    for k in range(DISC_PASSES + 1):
-        discs = first if k == 0 and first is not None else find_discs(level, table, smallest)
-        whole, left = max(whole, discs.area), discs.area
-        if k == DISC_PASSES or len(discs.candidates.x) == 0 or discs.covered < CLEAN_COVER_REST:
-            break
-        count = len(table)
-        table = _judge(measurer, discs.candidates, table, False, min_quality, OVERLAP)
-        if len(table) <= count:
-            break
-    return table, left < MAX_BRIGHT_LEFT * whole
-
-
-def _judge(
-    measurer: CircleMeasurer, rough: Circles, table: Array, known: bool, min_quality: float, overlap: float = TOUCHING
-) -> Array:
-    """Add the candidates that are grains and overlap no better one to the table x, y, radius, quality (c, 4).
-
-    overlap: greatest overlap, as a fraction of the smaller radius.
-    """
-    unjudged = np.ones(len(rough.x), dtype=np.bool_)
-    judged_circles = np.full((len(rough.x), 4), np.nan)  # x, y, radius, quality of those that were measured
-    places = np.stack([rough.x, rough.y, rough.radius], axis=1)
-    overlapped = np.full_like(places, np.nan)  # x, y, radius of the circle in the table that overlapped each one last
-    tree = KDTree(places[:, :2]) if known and len(rough.x) else None
-    while True:
-        left = np.flatnonzero(unjudged)
-        circles, beside = places[left], overlapped[left]
-        apart = not_overlapping(circles, table, beside, allowed=0.6)
-        overlapped[left] = beside
-        left = left[apart]
-        if len(left) == 0:
-            return table
-        # A candidate may remove a true circle and then prove no grain itself, or be removed later by a better circle.
-        # Another pass then tests the removed ones.
-        chosen = left[without_overlap(rough.x[left], rough.y[left], rough.radius[left], allowed=0.6)]
-        unjudged[chosen] = False
-        if tree is not None:  # the candidates of the other known radii at that place are compared
-            chosen = np.concatenate([_best_of_every_radius(rough, tree, k) for k in chosen])
-        new = np.unique(chosen[np.isnan(judged_circles[chosen, 0])])
-        judged_circles[new] = _measure(measurer, rough, new, known, min_quality)
-        judged = judged_circles[chosen]
-        table = np.concatenate([table, judged[judged[:, 3] > min_quality]])
-        # A longer outline is more significant at the same quality.
-        table = table[np.argsort(-table[:, 3] * np.sqrt(table[:, 2]), kind="stable")]
-        table = table[without_overlap(table[:, 0], table[:, 1], table[:, 2], allowed=overlap)]
-
-
-def _measure(
-    measurer: CircleMeasurer, rough: Circles, rows: NDArray[np.intp], known: bool, min_quality: float
-) -> Array:
-    """Measure x, y, radius, quality (c, 4) of some of the rough circles."""
-    size = rough.radius[rows]
-    window = np.maximum([_window(each, known) for each in size], rough.error[rows])
-    radius_sd = 0.3 if known else np.inf
-    found = measurer.measure(_rough(rough.x[rows], rough.y[rows], size, window, radius_sd))
-    if not known:
-        return found[:, [0, 1, 2, 4]]
-    quality = 2.0 * found[:, 4]
-    # Around the fitted circle, a narrower window excludes paint near the rim. Alone it would accept too many circles.
-    again = np.flatnonzero(quality > min_quality)
-    window = np.full(len(again), 0.5 * RING_UNCERTAINTY)
-    found[again] = measurer.measure(_rough(found[again, 0], found[again, 1], size[again], window, radius_sd))
-    quality[again] = np.minimum(found[again, 4], quality[again])
-    return np.column_stack([found[:, :2], size, quality])
-
-
-def _rough(x: Array, y: Array, radius: Array, window: Array, radius_sd: float) -> Array:
-    """Rough circles (c, 6) for `CircleMeasurer.measure`, without a shift of their edges."""
-    return np.column_stack([x, y, radius, window, np.zeros(len(x)), np.full(len(x), radius_sd)])
-
-
-def _best_of_every_radius(rough: Circles, tree: KDTree, k: int) -> NDArray[np.intp]:
-    """The candidate with the highest score of every radius around candidate k."""
-    widest = float(rough.radius.max() - rough.radius.min())
-    error = max(RING_UNCERTAINTY, float(rough.error[k]))  # besides the difference of two classes' radii
-    near = np.sort(np.asarray(tree.query_ball_point([rough.x[k], rough.y[k]], widest + error)))
-    distance = np.hypot(rough.x[near] - rough.x[k], rough.y[near] - rough.y[k])
-    near = near[distance <= np.abs(rough.radius[near] - rough.radius[k]) + error]
-    # Candidates are in the order of their score: the first of every radius is its best.
-    _, first = np.unique(rough.radius[near], return_index=True)
-    return near[np.sort(first)]
-
-
-def _window(radius: float, known: bool) -> float:
-    """Half width of the search for edges around a rough circle [px]: narrower for small grains, beside neighbours."""
-    window = min(RING_UNCERTAINTY, max(SMALL_FRACTION * radius, 0.5 * RING_UNCERTAINTY))
-    return window if known else max(window, 0.6 * (SCAN_STEP - 1.0) * radius)
-
-
 def _default_range(image: Image) -> tuple[float, float]:
     low, high = RADIUS_RANGE
     return low, max(min(high, LARGEST_FRACTION * min(image.shape)), 1.5 * low)
-
-
-def _radius_steps(limits: tuple[float, float]) -> Array:
-    steps = int(np.ceil(np.log(limits[1] / limits[0]) / np.log(SCAN_STEP)))
-    return np.geomspace(limits[0], limits[1], steps + 1)

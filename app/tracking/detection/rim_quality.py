@@ -42,11 +42,7 @@ def refine_given(image: Image, x: Array, y: Array, radius: Array) -> Detection:
 
 def describe_scale(image: Image, rods: Detection) -> str:
     """State that the rims show other radii than the known ones, which a wrong pixel size does; empty: they agree."""
-    free = refine_grains(image, rods.x, rods.y, rods.radius, fixed_radius=False)
-    seen = (free.quality > FAINT) & np.isfinite(free.sigma)
-    if seen.sum() < FEWEST_RIMS:
-        return ""
-    ratio = float(np.median(free.radius[seen] / rods.radius[seen]))
+    ratio = _rims_over_radii(image, rods)
     off = abs(ratio - 1.0)
     if not (off > WRONG_SCALE and off * float(np.median(rods.radius)) > UNSHARP):
         return ""
@@ -54,6 +50,24 @@ def describe_scale(image: Image, rods: Detection) -> str:
         f"By their rims the rods are {100.0 * off:.1f} % {'larger' if ratio > 1.0 else 'smaller'} than the known radii "
         "at this pixel size: measure it along a known length (rodsight open, step Scale), or check the radii."
     )
+
+
+def describe_wide_rims(image: Image, rods: Detection) -> str:
+    """State that radii were found smaller than the rims show; empty: they agree."""
+    reduced = 1.0 - 1.0 / _rims_over_radii(image, rods)
+    if not reduced > WRONG_SCALE:
+        return ""
+    return (
+        f"By their rims neighbours would overlap: radii were reduced by {100.0 * reduced:.0f} % until they touch. The "
+        "rims of thick discs show their sides, too; known radii are better (--radii)."
+    )
+
+
+def _rims_over_radii(image: Image, rods: Detection) -> float:
+    """Return the median ratio of the rims' radii and the given ones; 1 of too few rims."""
+    free = refine_grains(image, rods.x, rods.y, rods.radius, fixed_radius=False)
+    seen = (free.quality > FAINT) & np.isfinite(free.sigma)
+    return float(np.median(free.radius[seen] / rods.radius[seen])) if seen.sum() >= FEWEST_RIMS else 1.0
 
 
 def describe_faint_rims(rods: Detection) -> str:

@@ -26,6 +26,8 @@ PEAK_ERROR = 1.5  # greatest error of a circle's centre [px of the shrunk photog
 CIRCLE_SD = 0.8  # blur of a circle [px of the shrunk photograph]
 WAVE_NUMBERS = 2**14  # of the table of a circle's spectrum
 
+SCAN_STEP = 1.06  # ratio of successive radii in the search for circles of unknown radius
+
 # Greatest number of pixels on which several radii are searched for at a time, to save memory.
 PARALLEL_PIXELS = 12_000_000
 
@@ -46,6 +48,12 @@ class Circles:
     def select(self, rows: NDArray[np.bool_]) -> Circles:
         """Return some of the circles, rows (c,)."""
         return Circles(self.x[rows], self.y[rows], self.radius[rows], self.score[rows], self.error[rows])
+
+
+def radius_steps(limits: tuple[float, float]) -> Array:
+    """Return the radii (k,) [px] at which circles of unknown radius between two limits are searched for."""
+    steps = int(np.ceil(np.log(limits[1] / limits[0]) / np.log(SCAN_STEP)))
+    return np.geomspace(limits[0], limits[1], steps + 1)
 
 
 def find_circles(image: Image, radii: Array, *, min_score: float, finest: bool = False) -> Circles:

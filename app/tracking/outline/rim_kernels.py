@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..detection.edges import fit_points, weighted_median
+from ..detection.circles.edges import fit_points, weighted_median
 from ..interpolation.spline_values import interpolate_cubic
 from ..short_sort import ascending_order
 

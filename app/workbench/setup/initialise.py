@@ -23,7 +23,7 @@ from ...process.errors import InputError
 from ...process.frame_range import ALL_FRAMES, FrameRange
 from ...tracking.detection.channels import View, compare_views
 from ...tracking.detection.detect import Detection, DetectionSettings, refine_grains
-from ...tracking.detection.rim_quality import describe_faint_rims, describe_scale
+from ...tracking.detection.rim_quality import describe_faint_rims, describe_scale, describe_wide_rims
 from ...tracking.outline.missing_discs import add_missing_discs
 from ...tracking.texture_or_outline import prefer_outlines
 from . import edits
@@ -130,10 +130,13 @@ def _initialise(folder: Path, draft: Draft, flags: SetupFlags, video: list[str])
             plain, followed = replace_unseen_bars(draft, images, found, flags.pressure)
         found = _without_errors(draft, "photographs")
         write_atomically(folder / PICTURE, draw_setup(_first(photographs, selection), found))
-        faint = [] if flags.grains is not None else [describe_faint_rims(detection)]
+        rims = [] if flags.grains is not None else [describe_faint_rims(detection)]
+        if not flags.radii and flags.grains is None:
+            lit = np.float32(FULL_SCALE) - first if view.dark else first
+            rims.append(describe_wide_rims(lit, detection))
         stated = {
             "photographs": video, "scale": [describe_scale(first, detection)] if flags.radii else [],
-            "rods": [*left_out, *classes, *how, *faint], "walls": [*notes, *plain],
+            "rods": [*left_out, *classes, *how, *rims], "walls": [*notes, *plain],
         }  # fmt: skip
     found.steps["rods"].messages += remarks  # of what is seen, which is no reason to look again
     found.steps["walls"].messages += followed
@@ -204,7 +207,7 @@ def _detect(
         tried.append((view, detection))
         if tried[-1][1].count >= KEPT * view.count:
             break
-    view, detection = max(tried, key=lambda each: float(each[1].quality @ each[1].radius))
+    view, detection = max(tried, key=lambda each: each[1].seen_area)
     if detection.count == 0:
         cure = "check --radii and --pixel-size" if flags.radii else "give their --radii"
         raise InputError(validated.files[0], "", f"no rods were found; {cure}, or mark them by rodsight open")

@@ -145,9 +145,11 @@ def test_missed_rods_are_measured_like_the_others(monkeypatch: pytest.MonkeyPatc
     _detect_without(monkeypatch, MISSED, centre)
     found = detect_rods(image, settings)
     assert found.count == all_rods.count == SIDE**2 - len(HOLES)
-    np.testing.assert_allclose(found.x, all_rods.x, atol=0.1)
-    np.testing.assert_allclose(found.y, all_rods.y, atol=0.1)
-    np.testing.assert_allclose(found.radius, all_rods.radius, atol=0.1)
+    # Rows of rods at the same height are in the order of hundredths of a pixel.
+    away, nearest = KDTree(np.column_stack([all_rods.x, all_rods.y])).query(np.column_stack([found.x, found.y]))
+    assert (np.sort(nearest) == np.arange(all_rods.count)).all()
+    assert away.max() < 0.1
+    np.testing.assert_allclose(found.radius, all_rods.radius[nearest], atol=0.1)
 
 
 def test_a_disc_that_does_not_look_like_the_rods_is_not_added(monkeypatch: pytest.MonkeyPatch) -> None:

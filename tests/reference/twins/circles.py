@@ -1,4 +1,4 @@
-"""One circle measured in plain numpy, twin of `app/tracking/detection/circle_kernels.py`."""
+"""One circle measured in plain numpy, twin of `app/tracking/detection/circles/circle_kernels.py`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from rodsight.experiment.pictures.image import Image
 from rodsight.solver.bodies.grains import Array
-from rodsight.tracking.detection.edges import fit_circle, trace_outline
+from rodsight.tracking.detection.circles.edges import fit_circle, trace_outline
 
 
 class FittedCircle(NamedTuple):

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 from rodsight.experiment.pictures.image import LUMA
-from rodsight.tracking.detection.circle_measurement import CircleMeasurer, MeasuredCircle
+from rodsight.tracking.detection.circles.circle_measurement import CircleMeasurer, MeasuredCircle
 from rodsight.tracking.detection.detect import DetectionSettings, _accidental, detect_grains
 
 from tests.app.tracking.real_like import Laboratory, brown_photograph

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ..short_sort import select
+from ...short_sort import select
 from .edges import DENSITY, MARGIN, fit_circle, trace
 from .rim_profile import fit_rim
 

@@ -8,10 +8,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ...experiment.pictures.image import Image
-from ...solver.bodies.grains import Array
-from ..interpolation.spline_values import interpolate_cubic
-from ..short_sort import ascending_order
+from ....experiment.pictures.image import Image
+from ....solver.bodies.grains import Array
+from ...interpolation.spline_values import interpolate_cubic
+from ...short_sort import ascending_order
 
 # Samples along a radius [1/px].
 DENSITY = 4

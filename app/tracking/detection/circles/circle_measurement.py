@@ -9,15 +9,15 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ...experiment.pictures.image import Image
-from ...solver.bodies.grains import Array
-from ...solver.parallel import available_cores, parallel_map
-from ..correlation.noise import image_noise
-from ..correlation.splines import spline_coefficients
+from ....experiment.pictures.image import Image
+from ....solver.bodies.grains import Array
+from ....solver.parallel import available_cores, parallel_map
+from ...correlation.noise import image_noise
+from ...correlation.splines import spline_coefficients
+from ..rings import local_contrast, tile_size
 from .circle_kernels import DARK_HALF, SMALL, measure_circles, measure_closely, see_edges
 from .edges import DENSITY, Outline, trace_outline
 from .rim_profile import locate_edges
-from .rings import local_contrast, tile_size
 
 # Greatest difference between the level beyond an edge and the darkest around the grain, as a fraction of the contrast:
 # where grains nearly touch, the gap's dark is not reached, which shifts an edge but does not invalidate it.

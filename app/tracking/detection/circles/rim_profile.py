@@ -20,10 +20,10 @@ import math
 import numpy as np
 from numba import njit
 
-from ...experiment.pictures.image import Image
-from ...solver.bodies.grains import Array
-from ...solver.robust_scale import SD_OVER_MAD
-from ..short_sort import median
+from ....experiment.pictures.image import Image
+from ....solver.bodies.grains import Array
+from ....solver.robust_scale import SD_OVER_MAD
+from ...short_sort import median
 
 # Fitted part of a ray and range of its dark [px from the edge], and the same in widths of the blur where that is more:
 # a soft edge still falls where a sharp one has ended, and a dark that is read there displaces the edge.
