@@ -93,10 +93,8 @@ def _with_missed(image: Image, found: Detection, settings: DetectionSettings, *,
     radii, odd = _sizes(found.radius, settings)
     if len(radii) == 0:
         return found
-    if not plain:
-        found, others = found.select(~odd), found.select(odd)
-    else:
-        others = found.select(np.zeros(found.count, np.bool_))
+    odd &= not plain
+    found, others = found.select(~odd), found.select(odd)
     for _ in range(ROUNDS):
         places = find_missed_rods(image, found.x, found.y, found.radius)
         if len(places) == 0:
