@@ -62,10 +62,13 @@ def find_faint_grains(
     (d, 4) array
         The table that results.
     """
-    if len(table) == 0 or _usual_step(image, table) < LEAST_STEP * image_noise(image):
+    if len(table) == 0:
         return measurer, table
     plain = _light_range(measurer.level, table) < PLAIN
-    before = table
+    light = PLAIN_LIGHT if plain else PAINTED_LIGHT
+    (step, spread), before = _steps(image, table, light), table
+    if _usual(step, table) < LEAST_STEP * image_noise(image):
+        return measurer, table
     if plain:
         sizes = np.array(sorted(set(classes))) if classes else radius_steps(_range_of_sizes(table))
         # Known sizes allow smaller tiles of local contrast, in which uneven light is even.
@@ -73,10 +76,9 @@ def find_faint_grains(
         measurer.plain = True
         rough = find_circles(image, sizes, min_score=least[0])
         table = judge_circles(measurer, rough, table, bool(classes), CLEAN_QUALITY * least[1], OVERLAP)
-    light = PLAIN_LIGHT if plain else PAINTED_LIGHT
-    (step, spread), usual = _steps(image, table, light), _usual_step(image, table, light)
+        step, spread = _steps(image, table, light)
     added = KDTree(before[:, :2]).query(table[:, :2])[0] > 0.0
-    texture = (step < LOW_STEP * usual) & (added | (step <= UNEVEN * spread))
+    texture = (step < LOW_STEP * _usual(step, table)) & (added | (step <= UNEVEN * spread))
     return measurer, table[~texture | (table[:, 3] > CLEAR)]
 
 
@@ -104,8 +106,8 @@ def _light_range(level: Image, table: Array) -> float:
     return _weighted_quantile(found[whole], weight[whole], 0.5) if whole.any() else np.inf
 
 
-def _usual_step(image: Image, table: Array, light: float = PLAIN_LIGHT) -> float:
-    return _weighted_quantile(_steps(image, table, light)[0], table[:, 2] ** 2, USUAL)
+def _usual(step: Array, table: Array) -> float:
+    return _weighted_quantile(step, table[:, 2] ** 2, USUAL)
 
 
 def _steps(image: Image, table: Array, light: float) -> tuple[Array, Array]:
@@ -116,12 +118,16 @@ def _steps(image: Image, table: Array, light: float) -> tuple[Array, Array]:
     radius = table[:, 2]
     inside = np.concatenate([_around(image, table, depth * radius) for depth in DEPTHS], axis=1)
     outside = _around(image, table, radius + BESIDE)
-    step, spread = np.full((2, len(table)), np.nan)
-    seen = np.isfinite(outside).any(axis=1) & np.isfinite(inside).any(axis=1)
-    low, middle, high = np.nanquantile(inside[seen], (MOST[0], light, MOST[1]), axis=1)
-    step[seen] = middle - np.nanquantile(outside[seen], DARK, axis=1)
-    spread[seen] = 0.5 * (high - low)
-    return step, spread
+    low, middle, high = _row_quantiles(inside, (MOST[0], light, MOST[1]))
+    return middle - _row_quantiles(outside, (DARK,))[0], 0.5 * (high - low)
+
+
+def _row_quantiles(values: Array, parts: tuple[float, ...]) -> Array:
+    """Return quantiles (k, c) of the rows (c, p) without their NaN, the nearest of the values; NaN of nothing."""
+    ordered = np.sort(values, axis=1)
+    last = np.isfinite(values).sum(axis=1) - 1
+    place = np.rint(np.outer(parts, np.maximum(last, 0))).astype(np.intp)
+    return ordered[np.arange(len(values)), place]
 
 
 def _around(image: Image, table: Array, reach: Array) -> Array:

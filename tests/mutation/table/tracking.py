@@ -9,13 +9,13 @@ MUTANTS = [
     *mutants_of(
         "app/tracking/detection/faint_grains.py",
         "tests/app/tracking/detection/test_faint_grains.py",
-        ("step < LOW_STEP * usual", "step < -LOW_STEP * usual"),
+        ("step < LOW_STEP * _usual", "step < -LOW_STEP * _usual"),
         ("added | (step <= UNEVEN * spread)", "step <= UNEVEN * spread"),
         ("added | (step <= UNEVEN * spread)", "added | (step <= 99.0 * spread)"),
         (" | (table[:, 3] > CLEAR)", ""),
         ("measurer.plain = True", "measurer.plain = False"),
         ("CLEAN_QUALITY * least[1], OVERLAP", "3.0 * least[1], OVERLAP"),
-        ("outside[seen], DARK", "outside[seen], PLAIN_LIGHT"),
+        ("_row_quantiles(outside, (DARK,))", "_row_quantiles(outside, (PLAIN_LIGHT,))"),
     ),
     *mutants_of(
         "app/tracking/detection/rings.py",
