@@ -75,6 +75,19 @@ def test_a_circle_that_is_no_brighter_than_the_dark_beside_it_is_removed_unless_
     assert kept(0.6) == [50.0, 130.0, 210.0]
 
 
+def test_a_dark_even_disc_stays_where_it_was_found_but_is_not_added() -> None:
+    row, column = np.mgrid[0:100, 0:260]
+    image = _three_discs()
+    away, angle = np.hypot(column - 210.0, row - 50.0), np.arctan2(row - 50.0, column - 210.0)
+    image[(away < 30.0) & ((angle / (0.5 * np.pi) % 1.0 > 0.3) | (away < 20.0))] = 45.0  # four gaps are dark
+    image = cv2.GaussianBlur(image, (0, 0), 0.8) + np.random.default_rng(1).normal(0.0, 1.0, image.shape)
+    image = image.astype(np.float32)
+    found = np.array([(50.0, 50.0, 20.0, 0.4), (210.0, 50.0, 20.0, 0.4)])
+    for table in (found, found[:1]):
+        _, after = find_faint_grains(image, CircleMeasurer(image, 20.0), table, (20.0,), LEAST)
+        assert (np.abs(after[:, 0] - 210.0) < 3.0).sum() == len(table) - 1
+
+
 def test_of_no_circles_nothing_follows() -> None:
     image = np.zeros((60, 60), np.float32)
     measurer = CircleMeasurer(image, 10.0)
