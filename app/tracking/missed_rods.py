@@ -23,6 +23,7 @@ from ..solver.bodies.grains import Array
 from ..solver.boundary.size_classes import find_common_sizes
 from ..solver.even_subset import even_subset
 from ..solver.robust_scale import SD_OVER_MAD
+from .detection.appearance import INSIDE, appearance
 from .detection.detect import MIN_RADIUS, Detection, DetectionSettings, MissedGrainSearch, detect_grains
 from .detection.judge_circles import TOUCHING
 from .detection.rings import beside
@@ -33,7 +34,7 @@ DRAWN = 10.0  # [px] of the smallest radius in the picture in which distances ar
 RIM_POINTS = 32  # of a disc, for the area that all enclose
 PORE = 0.12, 0.5  # of the smallest radius: widths of the pores that are compared …
 NARROWEST = 3.0  # [px] … and at least
-INSIDE, INSIDE_PORE = 0.8, 0.7  # of a radius: the part of a disc that is looked at
+INSIDE_PORE = 0.7  # of a radius: the part of a pore that is looked at
 MOST, MOST_PORES = 50, 400  # places and pores
 ALIKE = 4.0  # robust standard deviations of brightness and contrast within which a place looks like a rod
 LEAST_SD = np.array([3.0, 0.1])  # of brightness [grey] and of the logarithm of the contrast
@@ -112,7 +113,7 @@ def _with_missed(image: Image, found: Detection, settings: DetectionSettings, *,
 
 def _are_plain(image: Image, found: Detection) -> bool:
     """Whether the circles bear no paint, which could look like circles itself."""
-    look = _appearance(image, _circles(found)[even_subset(found.count, LOOKED_AT)], INSIDE)[:, 1]
+    look = appearance(image, _circles(found)[even_subset(found.count, LOOKED_AT)], INSIDE)[:, 1]
     dark, bright = np.percentile(image, [3.0, 95.0])
     return bool(np.nanmedian(np.append(np.expm1(look), np.inf)) < PLAIN * (bright - dark)) if found.count else True
 
@@ -229,7 +230,7 @@ def find_missed_rods(image: Image, x: Array, y: Array, radius: Array) -> Array:
 
 def _looks_of(image: Image, rods: Array) -> tuple[Array, Array] | None:
     """Return median and robust standard deviation (2,) of the appearance of rods (n, 3); None of too few."""
-    look = _appearance(image, rods, INSIDE)
+    look = appearance(image, rods, INSIDE)
     look = look[np.isfinite(look).all(axis=1)]
     if len(look) < FEWEST:
         return None
@@ -240,7 +241,7 @@ def _looks_of(image: Image, rods: Array) -> tuple[Array, Array] | None:
 def _are_alike(image: Image, discs: Array, part: float, looks: tuple[Array, Array]) -> NDArray[np.bool_]:
     """Mark the discs (n, 3) a part of which looks as rods do."""
     middle, sd = looks
-    away = np.abs(_appearance(image, discs, part) - middle) / sd
+    away = np.abs(appearance(image, discs, part) - middle) / sd
     return np.nan_to_num(away, nan=np.inf).max(axis=1, initial=0.0) < ALIKE
 
 
@@ -285,18 +286,3 @@ def _find_pores(free: NDArray[np.uint8], scale: float, corner: Array, smallest: 
     row, column = row[chosen], column[chosen]
     place = np.column_stack([column, row]) / scale + corner
     return np.column_stack([place, radius[row, column].astype(np.float64)])
-
-
-def _appearance(image: Image, discs: Array, part: float) -> Array:
-    """Mean grey level and logarithm of the contrast (n, 2) within a part of discs (n, 3); NaN beyond the photograph."""
-    found = np.full((len(discs), 2), np.nan)
-    for k, (x, y, radius) in enumerate(discs):
-        reach = max(part * radius, 1.5)
-        top, left = int(np.ceil(y - reach)), int(np.ceil(x - reach))
-        bottom, right = int(np.floor(y + reach)) + 1, int(np.floor(x + reach)) + 1
-        if top < 0 or left < 0 or bottom > image.shape[0] or right > image.shape[1]:
-            continue
-        rows, columns = np.ogrid[top:bottom, left:right]
-        grey = image[top:bottom, left:right][(rows - y) ** 2 + (columns - x) ** 2 <= reach**2]
-        found[k] = grey.mean(), np.log1p(grey.std())
-    return found

@@ -1,4 +1,4 @@
-"""Means and medians over contacts weighted by their probability to bear force or to touch."""
+"""Means and quantiles over contacts weighted by their probability to bear force or to touch."""
 
 from __future__ import annotations
 
@@ -20,6 +20,11 @@ def weighted_mean(value: Array, weight: Array) -> float:
 
 def weighted_median(value: Array, weight: Array) -> float:
     """Return the value (c,) up to which half of the weight (c,) lies; Σ w > 0."""
+    return weighted_quantile(value, weight, 0.5)
+
+
+def weighted_quantile(value: Array, weight: Array, part: float) -> float:
+    """Return the value (c,) up to which a part of the weight (c,) lies; Σ w > 0."""
     order = np.argsort(value)
     total = np.cumsum(weight[order])
-    return float(value[order[np.searchsorted(total, 0.5 * total[-1])]])
+    return float(value[order[np.searchsorted(total, part * total[-1])]])

@@ -40,6 +40,10 @@ class View:
     score: float  # area that they cover, over π, weighted by the visible part of their outlines [px²]
     radius_range: tuple[float, float] | None  # [px of the photograph] of the discs; None: too few
 
+    def lit(self, image: Image) -> Image:
+        """Return the photograph (H, W) with discs that are lighter than their surroundings."""
+        return np.float32(FULL_SCALE) - image if self.dark else image
+
     def describe(self) -> str:
         """Describe the view in a few words."""
         return f"{self.count} {'dark' if self.dark else 'light'} discs in {self.channel}"

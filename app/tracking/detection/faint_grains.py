@@ -15,7 +15,9 @@ from scipy.spatial import KDTree
 
 from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
+from ...solver.statistics.weighted import weighted_quantile
 from ..correlation.noise import image_noise
+from .appearance import INSIDE, appearance
 from .circles.circle_measurement import CircleMeasurer
 from .discs import OVERLAP
 from .judge_circles import CLEAN_QUALITY, judge_circles
@@ -25,7 +27,6 @@ CLEAR = 0.55  # fraction of an outline that is seen of a circle that is certain
 # Range of the relative light of plain grains, one standard deviation: measured .05 to .14 in discs of photoelastic
 # tests and brown rods, .2 and more in painted ones.
 PLAIN = 0.17
-INSIDE = 0.8  # of a radius: the part of a disc that is looked at
 SIZES, SIZE_MARGIN = (0.05, 0.95), 0.1  # quantiles of the area of those that were found, and relative width beyond them
 LEAST_RADIUS = 3.1  # [px]
 # A grain is brighter than the dark beside it by this fraction of what is usual: the quantile over the area of circles.
@@ -85,29 +86,21 @@ def find_faint_grains(
 def _range_of_sizes(table: Array) -> tuple[float, float]:
     """Return the range of radii [px] about those of most of the visible area."""
     weight = table[:, 3] * table[:, 2] ** 2
-    smallest, largest = (_weighted_quantile(table[:, 2], weight, part) for part in SIZES)
+    smallest, largest = (weighted_quantile(table[:, 2], weight, part) for part in SIZES)
     return max((1.0 - SIZE_MARGIN) * smallest, LEAST_RADIUS), (1.0 + SIZE_MARGIN) * largest
 
 
 def _light_range(level: Image, table: Array) -> float:
     """Return the standard deviation of the relative light within circles, the median over their visible area."""
-    height, width = level.shape
-    found = np.full(len(table), np.inf)
-    for k, (x, y, radius, _) in enumerate(table):
-        reach = INSIDE * radius
-        top, left, bottom, right = int(y - reach), int(x - reach), int(y + reach) + 1, int(x + reach) + 1
-        if top < 0 or left < 0 or bottom > height or right > width:
-            continue
-        rows, columns = np.ogrid[top:bottom, left:right]
-        inside = (rows - y) ** 2 + (columns - x) ** 2 <= reach**2
-        found[k] = level[top:bottom, left:right][inside].std()
+    found = np.expm1(appearance(level, table[:, :3], INSIDE)[:, 1])
     whole = np.isfinite(found)
     weight = table[:, 3] * table[:, 2] ** 2
-    return _weighted_quantile(found[whole], weight[whole], 0.5) if whole.any() else np.inf
+    return weighted_quantile(found[whole], weight[whole], 0.5) if whole.any() else np.inf
 
 
 def _usual(step: Array, table: Array) -> float:
-    return _weighted_quantile(step, table[:, 2] ** 2, USUAL)
+    seen = np.isfinite(step)
+    return weighted_quantile(step[seen], table[seen, 2] ** 2, USUAL) if seen.any() else 0.0
 
 
 def _steps(image: Image, table: Array, light: float) -> tuple[Array, Array]:
@@ -138,13 +131,3 @@ def _around(image: Image, table: Array, reach: Array) -> Array:
     row = np.rint(table[:, 1:2] + reach[:, None] * np.sin(angle)).astype(np.intp)
     beyond: NDArray[np.bool_] = (column < 0) | (row < 0) | (column >= width) | (row >= height)
     return np.where(beyond, np.nan, image[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)])
-
-
-def _weighted_quantile(value: Array, weight: Array, part: float) -> float:
-    """Return the value below which a part of the weight lies; NaN is left out, and 0 of nothing."""
-    value, weight = value[np.isfinite(value)], weight[np.isfinite(value)]
-    if len(value) == 0:
-        return 0.0
-    order = np.argsort(value, kind="stable")
-    below = np.cumsum(weight[order])
-    return float(value[order][np.searchsorted(below, part * below[-1])])

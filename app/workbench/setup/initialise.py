@@ -16,7 +16,7 @@ from ...exchange.photographic.opencv_calibration import read_calibration
 from ...exchange.photographic.rod_readings import read_rods
 from ...exchange.photographic.video_frames import duration, extract_frames, is_video
 from ...experiment.photographs import Photographs
-from ...experiment.pictures.image import FULL_SCALE, Channel, Image, ImageSelection
+from ...experiment.pictures.image import Channel, Image, ImageSelection
 from ...experiment.pictures.picture_file import read_photograph
 from ...process.atomic import write_atomically
 from ...process.errors import InputError
@@ -132,8 +132,7 @@ def _initialise(folder: Path, draft: Draft, flags: SetupFlags, video: list[str])
         write_atomically(folder / PICTURE, draw_setup(_first(photographs, selection), found))
         rims = [] if flags.grains is not None else [describe_faint_rims(detection)]
         if not flags.radii and flags.grains is None:
-            lit = np.float32(FULL_SCALE) - first if view.dark else first
-            rims.append(describe_wide_rims(lit, detection))
+            rims.append(describe_wide_rims(view.lit(first), detection))
         stated = {
             "photographs": video, "scale": [describe_scale(first, detection)] if flags.radii else [],
             "rods": [*left_out, *classes, *how, *rims], "walls": [*notes, *plain],
@@ -200,8 +199,7 @@ def _detect(
     for view in views[:MOST_VIEWS]:
         image = selection.cut(read_photograph(photographs.files[0], channel=view.channel))  # type: ignore[arg-type]
         sizes = view.radius_range if flags.radius_range is None else flags.radius_range
-        lit = np.float32(FULL_SCALE) - image if view.dark else image
-        detection = edits.detect(lit, validated, flags.radii, sizes)
+        detection = edits.detect(view.lit(image), validated, flags.radii, sizes)
         if flags.follow != "texture":
             detection = add_missing_discs(image, detection)
         tried.append((view, detection))
@@ -221,8 +219,7 @@ def _in_classes(
     sizes = None if flags.radii or flags.grains is not None else edits.evident_classes(detection.radius)
     if sizes is None or found.scale is None:
         return detection, []
-    lit = np.float32(FULL_SCALE) - first if view.dark else first
-    again = edits.detect(lit, found, (sizes * found.scale.mean_size).tolist())
+    again = edits.detect(view.lit(first), found, (sizes * found.scale.mean_size).tolist())
     if again.count < KEPT_IN_CLASSES * detection.count:
         return detection, []
     listed = ", ".join(f"{1e3 * size * found.scale.mean_size:.4g}" for size in sizes)

@@ -110,8 +110,12 @@ MUTANTS = [
         (".select(beside(_circles(others), _circles(found), allowed=TOUCHING))", ""),
         ("return found.join(others", "return found  # .join(others"),
         ("ROUNDS = 8", "ROUNDS = 0"),
-        ("np.log1p(grey.std())", "0.0"),
         ("if radius < FITS * smallest:", "if radius < 2.0 * FITS * smallest:"),
+    ),
+    *mutants_of(
+        "app/tracking/detection/appearance.py",
+        "tests/app/tracking/test_missed_rods.py",
+        ("np.log1p(grey.std())", "0.0"),
     ),
     *mutants_of(
         "app/tracking/detection/detect.py",

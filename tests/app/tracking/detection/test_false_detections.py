@@ -83,3 +83,10 @@ def test_views_are_ordered_by_the_outlines_that_they_show() -> None:
     # Without a better view light discs in grey are the first.
     first = compare_views(dict.fromkeys(("grey", "red", "green", "blue"), red), settings)[0]
     assert (first.channel, first.dark) == ("grey", False)
+
+
+def test_large_discs_count_by_their_area_against_many_small_ones() -> None:
+    few = Detection(*np.zeros((2, 4)), np.full(4, 20.0), np.full(4, 0.1), np.ones(4))
+    many = Detection(*np.zeros((2, 40)), np.full(40, 5.0), np.full(40, 0.1), np.ones(40))
+    assert few.seen_area == 1600.0
+    assert few.seen_area > many.seen_area
