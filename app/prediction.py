@@ -146,8 +146,9 @@ def predict_accuracy(
         return Prediction(quality, None, NOT_PREDICTED_OF_ONE)
     inputs = Inputs(tracks, walls, material_of(config), settings_of(config))
     try:
-        inputs = inputs_as_used(inputs)
-        trial = solve_trial(inputs, PREDICTED_PHOTOGRAPHS, InferenceObserver(progress), by_forces=True)
+        inputs, corrected = inputs_as_used(inputs)
+        observer = InferenceObserver(progress)
+        trial = solve_trial(inputs, PREDICTED_PHOTOGRAPHS, observer, by_forces=True, corrected=corrected)
         compared = trial is not None and trial.expected[0] < COMPARED
         given = solve_trial(inputs, observer=InferenceObserver(progress)) if compared else None
         found = diagnose(inputs, given, progress)

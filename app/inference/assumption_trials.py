@@ -41,14 +41,20 @@ class _Assumption:
     words: str  # the assumption
 
 
-def inputs_as_used(inputs: Inputs) -> Inputs:
-    """Inputs of the first photographs of a test as a run uses them. Raises UndeterminedError."""
+def inputs_as_used(inputs: Inputs) -> tuple[Inputs, CorrectedSequence | None]:
+    """Inputs of a test as its first photographs show that a run uses them, and these corrected; None: not corrected.
+
+    Raises
+    ------
+    UndeterminedError
+        A requested quantity cannot be determined.
+    """
     if inputs.material.stiffness is not None:  # a stated one hides nothing
-        return inputs
+        return inputs, None
     few, _ = select_window(inputs, PREDICTED_PHOTOGRAPHS)
-    used = correct_by_trial(few)[0]
+    used, corrected = correct_by_trial(few)
     stretched = inputs if used.stretching is None else inputs.without(used.stretching)
-    return replace(stretched, material=used.material)
+    return replace(stretched, material=used.material), corrected
 
 
 def correct_by_trial(inputs: Inputs, progress: Progress = no_progress) -> tuple[Inputs, CorrectedSequence]:

@@ -109,11 +109,13 @@ def fit_touching_pairs(
     """
     value = np.where(radius_error, 0.5 * np.quantile(gap, FIRST_QUANTILE), 0.0) if start is None else start
     width, scatter = (FIRST_WIDTH if start is None else NEAR_WIDTH) * diameter, 0.0
+    rows = np.ascontiguousarray(design.T)
     normal, residual, weight = np.eye(len(value)), gap + design @ value, np.ones(len(gap))
     for _ in range(ROUNDS):
-        weight = (1.0 + (residual / width) ** 2) ** -2
-        normal = design.T @ (weight[:, None] * design)
-        value = -np.linalg.lstsq(normal, design.T @ (weight * gap), rcond=None)[0]
+        weight = 1.0 / (1.0 + (residual / width) ** 2) ** 2
+        weighted = weight * rows
+        normal = weighted @ design
+        value = -np.linalg.lstsq(normal, weighted @ gap, rcond=None)[0]
         before, residual = residual, gap + design @ value
         overlaps = residual[(residual < 0.0) & (residual > -WIDEST * diameter)]
         scatter = SD_OVER_MAD * float(np.median(-overlaps)) if len(overlaps) else 0.0

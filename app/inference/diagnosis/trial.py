@@ -15,6 +15,7 @@ from ...process.machine.linear_algebra import one_thread_each
 from ...solver.assessment.evidence import Evidence
 from ...solver.assessment.expected_correlation import correlation_score, expect_correlation, predict_correlation
 from ...solver.assessment.penalties import NO_PENALTY, Penalty, assess, find_penalties, most_by_intervals
+from ..corrected_sequence import CorrectedSequence
 from ..correction.close_photographs import choose_span
 from ..correction.correct_sequence import correct_sequence
 from ..correction.hard_grain_errors import correct_hard_grains
@@ -75,6 +76,7 @@ def solve_trial(
     *,
     first: int = 0,
     by_forces: bool = False,
+    corrected: CorrectedSequence | None = None,
 ) -> Trial | None:
     """Solve the first photographs of a sequence as a run would.
 
@@ -90,6 +92,8 @@ def solve_trial(
         First photograph.
     by_forces : bool
         Whether errors of centres are found by forces where a run would. Rivals of the input are compared without it.
+    corrected : CorrectedSequence, optional
+        The same photographs, where they are corrected already.
 
     Returns
     -------
@@ -100,7 +104,7 @@ def solve_trial(
     if given.tracks.frame_count < 2:
         return None
     store, observer = MemoryStore(), InferenceObserver() if observer is None else observer
-    sequence = correct_sequence(given)
+    sequence = correct_sequence(given) if corrected is None else corrected
     solve_frames(correct_hard_grains(sequence, observer.progress) if by_forces else sequence, store, observer)
     judged = store.frames[min(SETTLED, len(store.frames) - 1) :]
     judged = [each for each in judged if each.state.evidence.assessed]

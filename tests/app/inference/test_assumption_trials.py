@@ -151,7 +151,8 @@ def test_nothing_is_solved_where_gaps_hide_nothing(inputs, corrected, monkeypatc
 def test_a_trial_of_the_first_photographs_serves_all(inputs, corrected, monkeypatch):
     corrected.hide(Sequence(lens=stretching(-0.0025, -0.001)))
     solved(monkeypatch, 0.7, {"x -0.5 %": 1.0})
-    used = inputs_as_used(inputs)
+    used, sequence = inputs_as_used(inputs)
+    assert sequence is not None
     assert used.tracks.frame_count == inputs.tracks.frame_count
     np.testing.assert_allclose(used.tracks.position - MIDDLE, (inputs.tracks.position - MIDDLE) * [0.995, 1.0])
 

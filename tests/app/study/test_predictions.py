@@ -91,7 +91,7 @@ def test_a_remark_states_why_there_is_no_prediction():
 def test_photographs_that_show_everything_but_no_equilibrium_are_no_lack_of_photographs(monkeypatch, trial):
     for name in ("Inputs", "material_of", "settings_of", "measure_data_quality"):
         monkeypatch.setattr(prediction, name, lambda *_: GOOD)
-    monkeypatch.setattr(prediction, "inputs_as_used", lambda inputs: inputs)
+    monkeypatch.setattr(prediction, "inputs_as_used", lambda inputs: (inputs, None))
     monkeypatch.setattr(prediction, "solve_trial", lambda *_, **__: trial)
     monkeypatch.setattr(prediction, "diagnose", lambda *_: ())
     assert prediction.predict_accuracy("config", TRACKS, "walls").verdict() == prediction.NO_FORCES
@@ -105,12 +105,12 @@ def test_photographs_that_show_everything_but_no_equilibrium_are_no_lack_of_phot
 def test_rival_inputs_are_compared_where_the_first_twelve_photographs_leave_them_open(monkeypatch, evidence, compared):
     solved, diagnosed = [], []
 
-    def solve(inputs, photographs=6, observer=None, *, by_forces=False):
+    def solve(inputs, photographs=6, observer=None, *, by_forces=False, corrected=None):
         solved.append((photographs, by_forces))
         return Trial((evidence,), photographs)
 
     monkeypatch.setattr(prediction, "Inputs", lambda *_: "inputs")
-    monkeypatch.setattr(prediction, "inputs_as_used", lambda inputs: inputs)
+    monkeypatch.setattr(prediction, "inputs_as_used", lambda inputs: (inputs, None))
     monkeypatch.setattr(prediction, "material_of", lambda _: None)
     monkeypatch.setattr(prediction, "settings_of", lambda _: None)
     monkeypatch.setattr(prediction, "measure_data_quality", lambda *_: GOOD)

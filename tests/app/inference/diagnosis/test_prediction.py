@@ -19,7 +19,7 @@ def test_another_friction_is_named_unless_the_forces_fit_the_given_one(monkeypat
     monkeypatch.setattr(prediction, "material_of", lambda _: None)
     monkeypatch.setattr(prediction, "settings_of", lambda _: InferenceSettings())
     monkeypatch.setattr(prediction, "Inputs", lambda *_: None)
-    monkeypatch.setattr(prediction, "inputs_as_used", lambda inputs: inputs)
+    monkeypatch.setattr(prediction, "inputs_as_used", lambda inputs: (inputs, None))
     monkeypatch.setattr(prediction, "solve_trial", lambda *_, **__: SimpleNamespace(expected=(expected, 0.9, 1.0)))
     monkeypatch.setattr(prediction, "diagnose", lambda *_: found)
     predicted = prediction.predict_accuracy(None, SimpleNamespace(frame_count=2), SimpleNamespace())  # type: ignore[arg-type]

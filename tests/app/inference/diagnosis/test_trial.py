@@ -66,6 +66,14 @@ def test_errors_of_centres_are_found_by_forces_on_request(inputs, monkeypatch) -
     assert len(found) == 1
 
 
+def test_corrected_photographs_are_not_corrected_again(inputs, monkeypatch) -> None:
+    solved: list[object] = []
+    corrected = solve_into(monkeypatch, [EVIDENCE])
+    monkeypatch.setattr(module, "solve_frames", lambda sequence, *_: solved.append(sequence))
+    solve_trial(inputs, corrected="corrected")  # type: ignore[arg-type]
+    assert (corrected, solved) == ([], ["corrected"])
+
+
 def test_a_window_holds_as_many_photographs_as_requested_at_its_step(inputs, monkeypatch) -> None:
     times = inputs.tracks.time
     part, step = select_window(inputs, 3, 2)
