@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ...experiment.pictures.image import FULL_SCALE, Image
+from ...solver.parallel import parallel_map
 from ..correlation.noise import image_noise
 from ..correlation.splines import shrink
 from .detect import Detection, DetectionSettings, detect_grains
@@ -61,16 +63,18 @@ def compare_views(channels: Mapping[str, Image], settings: DetectionSettings) ->
         least = min(settings.radii) if settings.radii else (settings.radius_range or (8.0, 0.0))[0]
         factor = max(min(factor, int(least / MIN_RADIUS)), 1)
     small = _on_copy(settings, factor)
-    names = list(channels) if is_coloured(channels) else ["grey"]
-    views = []
-    for name in names:
+    copies = {"grey": shrink(channels["grey"], factor)}
+    for name in channels if is_coloured(channels) else ():
         copy = shrink(channels[name], factor)
         dark_level, light_level = np.percentile(copy, CONTRAST_PERCENTILES)
-        if light_level - dark_level < LEAST_CONTRAST * image_noise(copy) and name != "grey":
-            continue  # noise has circles everywhere
-        for dark in (False, True):
-            found = detect_grains(np.float32(FULL_SCALE) - copy if dark else copy, small)
-            views.append(View(name, dark, found.count, found.seen_area, _size_range(found, factor)))
+        if light_level - dark_level >= LEAST_CONTRAST * image_noise(copy):  # noise has circles everywhere
+            copies.setdefault(name, copy)
+
+    def look(name: str, dark: bool) -> View:
+        found = detect_grains(np.float32(FULL_SCALE) - copies[name] if dark else copies[name], small)
+        return View(name, dark, found.count, found.seen_area, _size_range(found, factor))
+
+    views = parallel_map([partial(look, name, dark) for name in copies for dark in (False, True)], None)
     usual = views[0].score
     return sorted(views, key=lambda view: -view.score if view.score > BETTER * usual else -usual - (view is views[0]))
 
