@@ -31,6 +31,7 @@ from .tables.outliers import remove_outliers, restore_exchanged_ids
 from .tables.rotations import correct_rotations
 from .tables.short_gaps import interpolate_short_gaps
 from .tables.wall_places import correct_wall_places
+from .tables.wall_scatter import correct_wall_scatter
 from .tables.wall_times import correct_wall_times
 from .tables.walls_at_rest import correct_walls_at_rest
 from .unseen import add_unseen
@@ -38,7 +39,7 @@ from .unseen import add_unseen
 # Corrections that the first frame reports, in this order.
 REMARKS = (
     "outliers", "gaps", "camera", "noise", "span", "size_classes", "softness", "resistance", "sizes", "ids",
-    "rotations", "times", "rest", "places",
+    "rotations", "times", "rest", "scatter", "places",
 )  # fmt: skip
 
 
@@ -149,6 +150,7 @@ def _correct_tables(inputs: Inputs) -> tuple[Tracks, WallTracks, dict[int, str],
             walls, done["times"] = correct_wall_times(tracks, walls)
             walls, resting = correct_walls_at_rest(tracks, walls)
             done["rest"] = "; ".join(each.evidence for each in resting if each.corrected)
+            walls, done["scatter"] = correct_wall_scatter(tracks, walls)
         if inputs.settings.calibration is not None:
             tracks, done["sizes"] = correct_exchanged_sizes(tracks, walls)
     tracks, done["outliers"] = remove_outliers(tracks, walls, inputs.placed)

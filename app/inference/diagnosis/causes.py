@@ -101,6 +101,11 @@ CAUSES: dict[str, Cause] = {
         "a run moves it with the rods that touch it: give the motion of the wall in every photograph",
         corrected=True,
     ),
+    "wall_scatter": Cause(
+        "rods seem to penetrate a wall in one photograph and to leave it in the next",
+        "a run moves it with the rods that stay at it: measure the places of the walls as exactly as those of the rods",
+        corrected=True,
+    ),
     "wall_forces": Cause(
         "a load, a sensor or the forces are wrong, and with a load the scale of all forces",
         "compare names, signs and units of the recorded forces with the loads of the same walls",

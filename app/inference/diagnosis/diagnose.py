@@ -26,6 +26,7 @@ from ..correction.correct_sequence import complete_walls, correct_sequence
 from ..correction.tables.outliers import find_repeated, restore_exchanged_ids, without_poses
 from ..correction.tables.rotations import correct_rotations
 from ..correction.tables.wall_places import correct_wall_places
+from ..correction.tables.wall_scatter import correct_wall_scatter
 from ..correction.tables.wall_times import correct_wall_times
 from ..correction.tables.walls_at_rest import correct_walls_at_rest
 from ..inputs import Inputs
@@ -145,11 +146,13 @@ def _examine_rotations(inputs: Inputs, tracks: Tracks, walls: WallTracks) -> tup
 
 
 def _examine_walls(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, list[Finding]]:
-    """Return the walls as a run moves them, and name those that are late or stated at rest."""
+    """Return the walls as a run moves them, and name those that are late, stated at rest, or that scatter."""
     walls, late = correct_wall_times(tracks, walls)
     walls, resting = correct_walls_at_rest(tracks, walls)
+    walls, scatter = correct_wall_scatter(tracks, walls)
     found = [finding("walls_shifted", late, corrected=True)] if late else []
-    return walls, found + [finding("wall_at_rest", each.evidence, corrected=each.corrected) for each in resting]
+    found += [finding("wall_at_rest", each.evidence, corrected=each.corrected) for each in resting]
+    return walls, found + ([finding("wall_scatter", scatter, corrected=True)] if scatter else [])
 
 
 def _compare_rivals(

@@ -20,6 +20,7 @@ WRONG_CLASS = 0.1  # of the rods
 MISSTATED = 0.2  # of the rods whose radii are stated too large by CLASS_ERROR
 CLASS_ERROR = 0.02  # of one class of radii
 INSIDE = 2e-3  # [m], by which a side is stated inside the packing
+WALL_SCATTER = 1e-4  # [m] of a component of an end of a wall
 EXCHANGED = 0.02  # of the rods, each with the one nearest to it
 JUMP = 1e-3  # [m] of one rod in one photograph
 OVERHANG = 0.05  # [m] of the bars beyond the packing at either end
@@ -91,6 +92,12 @@ def shift_side_inwards(observed: ObservedData, rng: np.random.Generator) -> Obse
     endpoints, right = observed.endpoints.copy(), observed.wall_names.index("right")
     endpoints[:, right, :, 0] -= INSIDE
     return replace(observed, endpoints=endpoints)
+
+
+def scatter_walls(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """State the ends of all walls with an error that is another in every photograph."""
+    error = WALL_SCATTER * rng.standard_normal(observed.endpoints.shape)
+    return replace(observed, endpoints=observed.endpoints + error)
 
 
 def stretch_picture(factor: float) -> Departure:

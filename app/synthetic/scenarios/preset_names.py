@@ -27,7 +27,7 @@ ScenarioName = Literal[
     "elliptic", "slightly_elliptic", "sizes_10",
     "time_reversed", "shuffled", "swapped_frames", "duplicate_frame",
     "theta_sign", "theta_zero", "theta_degrees", "theta_absent",
-    "mu_01", "mu_05", "walls_late", "left_late", "top_fixed", "wall_inside",
+    "mu_01", "mu_05", "walls_late", "left_late", "top_fixed", "wall_inside", "walls_scatter",
     "aspect_03", "aspect_1", "lens_03", "class_2", "some_radii", "wrong_class", "overhang", "outliers", "one_jump",
     "missing_poses", "exchanged_ids", "stepped_some_radii", "annulus_some_radii", "rising_lens",
     "unloaded_annulus", "unloaded_biaxial", "unloaded_cyclic", "unloaded_loose", "unloaded_noise_40",
