@@ -86,8 +86,8 @@ def correct_wall_scatter(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks,
         scatter = _scatter(each.along, float(np.mean(noise)))
         endpoints[:, w] = ends - each.outward[..., None] * normal[:, None] - (scatter[:, None] * along)[:, None]
         words.append(
-            f"rods that stay at wall '{walls.name[w]}' scatter by {1e6 * each.given:.0f} µm against its stated places, and "
-            f"by {1e6 * each.spread:.0f} µm if it moves with them"
+            f"rods that stay at wall '{walls.name[w]}' scatter by {1e6 * each.given:.0f} µm against its stated places, "
+            f"and by {1e6 * each.spread:.0f} µm if it moves with them"
         )
     return replace(walls, endpoints=endpoints), "; ".join(words)
 
