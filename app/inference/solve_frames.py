@@ -16,8 +16,11 @@ from ..solver.parallel import prefetch
 from ..solver.sequence.failure import describe_error, failed_frame
 from ..solver.sequence.frames import SequencePart, solve_sequence
 from ..solver.statistics.frame_statistics import ContactProbabilities, FrameStatistics, frame_statistics, no_statistics
+from ..tracks import TrackStatus
 from .corrected_sequence import CorrectedSequence
 from .frame_store import FrameStore, SolvedFrame
+
+MANY_UNRELIABLE = 0.1  # fraction of the poses of a photograph that is reported
 
 
 class InferenceObserver:
@@ -71,10 +74,15 @@ def solve_frames(sequence: CorrectedSequence, store: FrameStore, observer: Infer
 
 
 def with_remarks(sequence: CorrectedSequence, forces: FrameForces) -> FrameForces:
-    """Report the measured noise of all frames with the first, and which contacts belong to interpolated rods."""
+    """Report corrections of all frames with the first, unreliable poses, and which contacts have interpolated rods."""
+    tracks = sequence.tracks.frame(forces.frame)
     if forces.frame == 0 and sequence.remark:
         forces = replace(forces, reason=f"{sequence.remark}; {forces.reason}")
-    interpolated = sequence.tracks.frame(forces.frame).interpolated[0]
+    unreliable, shown = int((tracks.status == TrackStatus.SUSPECT).sum()), int(tracks.present.sum())
+    if unreliable > MANY_UNRELIABLE * shown:
+        words = f"{unreliable} of {shown} poses are unreliable: the photograph may be blurred, dark or covered"
+        forces = replace(forces, reason=f"{words}; {forces.reason}")
+    interpolated = tracks.interpolated[0]
     if not interpolated.any():
         return forces
     contacts, padded = forces.contacts, np.append(interpolated, False)

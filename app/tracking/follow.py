@@ -40,6 +40,9 @@ HISTORY = 8  # earlier frames that are handed to the tracker
 
 # Fraction of the first photograph's grains below which a photograph fails: the few that are found are accidental.
 MIN_FOUND_FRACTION = 0.1
+# Fraction of the reliable poses of the photograph before, below which a photograph fails: one that is blurred, dark or
+# covered shows less than its neighbours. A lasting change of the light is none after so many photographs.
+MIN_RELIABLE_FRACTION, MOST_UNRELIABLE = 0.4, 2
 
 # Least constant error of a centre measured by its rim [px]: rims are not lit evenly.
 RIM_SIGMA_MIN = 0.02
@@ -151,10 +154,33 @@ def _follow(
         damaged = tracker.find_damaged(recent[since:], k - len(recent[since:]), photographs.__getitem__)
         _renew(tracker, photographs, poses, damaged)
     pose = tracker.follow(image, recent, given)
+    failure = describe_failure(pose, poses, photographs.files[k].name)
+    return no_poses(tracker.reference, failure) if failure else pose
+
+
+def describe_failure(pose: FramePoses, poses: list[FramePoses], name: str) -> str:
+    """State why a photograph with some poses fails, after those before it; empty: it does not.
+
+    Parameters
+    ----------
+    pose : FramePoses
+        Of the photograph.
+    poses : list of FramePoses
+        Of all photographs before, the first one included.
+    name : str
+        Of the photograph's file.
+    """
     found, expected = int(pose.has_pose.sum()), int(poses[0].has_pose.sum())
     if found < MIN_FOUND_FRACTION * expected:
-        return no_poses(tracker.reference, f"{found} of {expected} grains are found in {photographs.files[k].name}")
-    return pose
+        return f"{found} of {expected} grains are found in {name}"
+    last = max(k for k, each in enumerate(poses) if not each.failed_reason)
+    reliable, usual = int(pose.is_reliable.sum()), int(poses[last].is_reliable.sum())
+    if len(poses) - 1 - last < MOST_UNRELIABLE and reliable < MIN_RELIABLE_FRACTION * usual:
+        return (
+            f"{reliable} of {expected} grains are found reliably in {name}, {usual} in the photograph before: is it "
+            "blurred, dark or covered?"
+        )
+    return ""
 
 
 def _renew(tracker: AnyTracker, photographs: Photographs, poses: list[FramePoses], rows: Rows) -> None:

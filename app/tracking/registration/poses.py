@@ -35,6 +35,10 @@ class FramePoses:
         return np.isfinite(self.x)
 
     @property
+    def is_reliable(self) -> NDArray[np.bool_]:
+        return self.has_pose & (self.status != TrackStatus.SUSPECT)
+
+    @property
     def pose(self) -> Array:
         """x, y, rotation (n, 3)."""
         return np.stack([self.x, self.y, self.rotation], axis=1)

@@ -221,6 +221,11 @@ MUTANTS = [
         ("np.arange(-BEFORE, BEHIND, 0.25)", "np.arange(BEHIND, 2.0 * BEHIND, 0.25)"),
     ),
     *mutants_of(
+        "app/inference/solve_frames.py",
+        f"{TESTS}/test_frame_remarks.py",
+        ("unreliable > MANY_UNRELIABLE * shown", "unreliable > 0"),
+    ),
+    *mutants_of(
         "app/inference/correction/tables/wall_scatter.py",
         f"{TESTS}/tables/test_wall_scatter.py",
         ("self.noise > (LEAST * self.spread) ** 2", "True"),

@@ -7,6 +7,19 @@ TESTS = f"tests/{REGISTRATION}"
 
 MUTANTS = [
     *mutants_of(
+        "app/tracking/follow.py",
+        "tests/app/tracking/test_failed_photographs.py",
+        ("if found < MIN_FOUND_FRACTION * expected:", "if False:"),
+        ("reliable < MIN_RELIABLE_FRACTION * usual", "reliable < MIN_RELIABLE_FRACTION * expected"),
+        ("len(poses) - 1 - last < MOST_UNRELIABLE and ", ""),
+        ("max(k for k, each in enumerate(poses) if not each.failed_reason)", "0"),
+    ),
+    *mutants_of(
+        "app/tracking/registration/poses.py",
+        "tests/app/tracking/test_failed_photographs.py",
+        ("return self.has_pose & (self.status != TrackStatus.SUSPECT)", "return self.has_pose"),
+    ),
+    *mutants_of(
         "app/tracking/detection/faint_grains.py",
         "tests/app/tracking/detection/test_faint_grains.py",
         ("step < LOW_STEP * _usual", "step < -LOW_STEP * _usual"),
