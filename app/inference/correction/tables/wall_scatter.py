@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.bodies.grains import Array
-from ....solver.bodies.wall_shapes import outward_normals
+from ....solver.bodies.wall_shapes import beside_wall, distance_from_walls, outward_normals
 from ....solver.robust_scale import SD_OVER_MAD
 from ....tracks import Tracks, WallTracks
 from .rods_at_walls import RodsAtWalls
@@ -94,23 +94,21 @@ def correct_wall_scatter(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks,
 
 def _measure(rods: RodsAtWalls, ends: Array) -> _Departure | None:
     """Departure of a wall with ends (f, 2, 2) from its rods; None: too few stay at it."""
-    tracks, shape = rods.tracks, (len(ends), rods.tracks.grain_count)
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    along = (ends[:, 1] - ends[:, 0]) / length[:, None]
-    gap, place = np.full(shape, np.nan), np.zeros(shape)
-    for k in range(shape[0]):
-        rows, gap[k, rows] = rods.near(k, ends[k])
-        place[k, rows] = 2.0 * (tracks.position[k, rows] - ends[k].mean(axis=0)) @ along[k] / length[k]
-    usual = np.full(shape[1], np.nan)
+    tracks, each = rods.tracks, ends[:, None]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
+    along = (ends[:, 1] - ends[:, 0]) / length
+    gap = distance_from_walls(each, None, tracks.position) - tracks.radius
+    beside = tracks.present & beside_wall(each, None, tracks.position, np.zeros(1))
+    gap[~(beside & (np.abs(gap) < rods.reach))] = np.nan
+    place = 2.0 * np.einsum("fnk,fk->fn", tracks.position - ends.mean(axis=1)[:, None], along) / length
     often = np.flatnonzero(np.isfinite(gap).mean(axis=0) >= SEEN)
-    usual[often] = np.nanmedian(gap[:, often], axis=0)
     if len(often) < FEWEST:
         return None
-    nearest = np.sort(usual[often])[NEAREST - 1]
-    stay = np.flatnonzero(usual < nearest + LAYER * rods.width)
+    usual = np.nanmedian(gap[:, often], axis=0)
+    stay = often[usual < np.sort(usual)[NEAREST - 1] + LAYER * rods.width]
     if len(stay) < FEWEST:
         return None
-    gap, place = gap[:, stay], place[:, stay]
+    gap, place = gap[:, stay], np.where(np.isfinite(gap), place, 0.0)[:, stay]
     line = _fit_lines(gap, place, rods.width)
     rest = gap - line[:, :1] - line[:, 1:] * place
     outward = np.stack([line[:, 0] - line[:, 1], line[:, 0] + line[:, 1]], axis=1)

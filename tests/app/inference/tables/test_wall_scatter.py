@@ -42,6 +42,15 @@ def test_walls_that_scatter_move_with_the_rods_that_stay_at_them(chosen):
     np.testing.assert_allclose(corrected.endpoints.mean(axis=0), given, atol=2.0 * NOISE)
 
 
+def test_rods_that_photographs_lack_are_left_out():
+    tracks, walls = rolling_tracks(step=0.0), scattering(four_walls(), [TOP])
+    position, lost = tracks.position.copy(), N - SIDE + np.arange(FRAMES)
+    position[np.arange(FRAMES), lost] = np.nan  # another one in each photograph
+    corrected, done = correct_wall_scatter(replace(tracks, position=position), walls)
+    assert "'top'" in done
+    assert (scatter_of(corrected, 1)[TOP] < 1.5 * NOISE).all()
+
+
 def test_walls_in_their_places_stay():
     tracks, walls = rolling_tracks(step=0.0), four_walls()
     assert correct_wall_scatter(tracks, walls) == (walls, "")
