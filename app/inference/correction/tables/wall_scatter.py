@@ -78,18 +78,19 @@ def correct_wall_scatter(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks,
     noise = [each.noise for each in found.values() if each.scatters]
     if not noise or _moved_by_camera(walls, found):
         return walls, ""
-    endpoints, words = walls.endpoints.copy(), []
-    for w, each in ((w, each) for w, each in found.items() if each.explained):
+    endpoints, moved = walls.endpoints.copy(), {w: each for w, each in found.items() if each.explained}
+    for w, each in moved.items():
         ends = walls.endpoints[:, w]
         along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
         normal = outward_normals(ends)
         scatter = _scatter(each.along, float(np.mean(noise)))
         endpoints[:, w] = ends - each.outward[..., None] * normal[:, None] - (scatter[:, None] * along)[:, None]
-        words.append(
-            f"rods that stay at wall '{walls.name[w]}' scatter by {1e6 * each.given:.0f} µm against its stated places, "
-            f"and by {1e6 * each.spread:.0f} µm if it moves with them"
-        )
-    return replace(walls, endpoints=endpoints), "; ".join(words)
+    listed = ", ".join(f"'{walls.name[w]}' by {1e6 * each.given:.0f} µm" for w, each in moved.items())
+    most = 1e6 * max(each.spread for each in moved.values())
+    return replace(walls, endpoints=endpoints), (
+        f"rods that stay at a wall scatter against its stated places, at {listed}, and by at most {most:.0f} µm if it "
+        "moves with them"
+    )
 
 
 def _measure(rods: RodsAtWalls, ends: Array) -> _Departure | None:
