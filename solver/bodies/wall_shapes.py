@@ -57,9 +57,14 @@ def outlines(endpoints: Array, side: Sides) -> list[Array]:
 
 def outward_normals(endpoints: Array) -> Array:
     """Return the unit normals (…, 2) out of the packing, of straight walls with endpoints (…, 2, 2) [m]."""
-    along = endpoints[..., 1, :] - endpoints[..., 0, :]
-    along = along / np.linalg.norm(along, axis=-1, keepdims=True)
+    along = directions(endpoints)
     return np.stack([along[..., 1], -along[..., 0]], axis=-1)
+
+
+def directions(endpoints: Array) -> Array:
+    """Return the unit vectors (…, 2) from the first to the second end of straight walls (…, 2, 2) [m]."""
+    along = endpoints[..., 1, :] - endpoints[..., 0, :]
+    return along / np.linalg.norm(along, axis=-1, keepdims=True)
 
 
 def wall_distance(endpoints: Array, side: Sides, point: Array) -> tuple[Array, Array]:

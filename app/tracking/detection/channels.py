@@ -44,7 +44,7 @@ class View:
 
     def lit(self, image: Image) -> Image:
         """Return the photograph (H, W) with discs that are lighter than their surroundings."""
-        return np.float32(FULL_SCALE) - image if self.dark else image
+        return lit(image, self.dark)
 
     def describe(self) -> str:
         """Describe the view in a few words."""
@@ -63,20 +63,28 @@ def compare_views(channels: Mapping[str, Image], settings: DetectionSettings) ->
         least = min(settings.radii) if settings.radii else (settings.radius_range or (8.0, 0.0))[0]
         factor = max(min(factor, int(least / MIN_RADIUS)), 1)
     small = _on_copy(settings, factor)
-    copies = {"grey": shrink(channels["grey"], factor)}
-    for name in channels if is_coloured(channels) else ():
-        copy = shrink(channels[name], factor)
-        dark_level, light_level = np.percentile(copy, CONTRAST_PERCENTILES)
-        if light_level - dark_level >= LEAST_CONTRAST * image_noise(copy):  # noise has circles everywhere
-            copies.setdefault(name, copy)
+    names = list(channels) if is_coloured(channels) else ["grey"]
+    copies = {name: shrink(channels[name], factor) for name in names}
 
     def look(name: str, dark: bool) -> View:
-        found = detect_grains(np.float32(FULL_SCALE) - copies[name] if dark else copies[name], small)
+        found = detect_grains(lit(copies[name], dark), small)
         return View(name, dark, found.count, found.seen_area, _size_range(found, factor))
 
-    views = parallel_map([partial(look, name, dark) for name in copies for dark in (False, True)], None)
+    shown = [name for name, copy in copies.items() if name == "grey" or _shows_anything(copy)]
+    views = parallel_map([partial(look, name, dark) for name in shown for dark in (False, True)], None)
     usual = views[0].score
     return sorted(views, key=lambda view: -view.score if view.score > BETTER * usual else -usual - (view is views[0]))
+
+
+def lit(image: Image, dark: bool) -> Image:
+    """Return a picture (H, W) reversed where its discs are darker than their surroundings."""
+    return np.float32(FULL_SCALE) - image if dark else image
+
+
+def _shows_anything(image: Image) -> bool:
+    """Whether the grey levels differ by more than noise, which has circles everywhere."""
+    dark_level, light_level = np.percentile(image, CONTRAST_PERCENTILES)
+    return bool(light_level - dark_level >= LEAST_CONTRAST * image_noise(image))
 
 
 def _size_range(found: Detection, factor: int) -> tuple[float, float] | None:

@@ -57,6 +57,16 @@ class RodsAtWalls:
         """Gaps [m] of rods (m,) of photograph k from a wall (2, 2), (m,), or with ends (t, 1, 2, 2), (t, m)."""
         return distance_from_walls(ends, None, self.tracks.position[k, rows]) - self.tracks.radius[rows]
 
+    def surface_motion(self, k: int, rows: NDArray[np.intp], along: Array) -> Array:
+        """Motion (m,) [m] to photograph k, in the direction (2,) of a wall, of the points of rods (m,) at the wall.
+
+        The wall runs counter-clockwise around the packing. NaN where a rod is missing; unknown rotations count as none.
+        """
+        tracks = self.tracks
+        moved = tracks.position[k, rows] - tracks.position[k - 1, rows]
+        turned = np.nan_to_num(tracks.rotation[k, rows] - tracks.rotation[k - 1, rows])
+        return moved @ along + turned * tracks.radius[rows]
+
     def touching(self, k: int, rows: NDArray[np.intp], ends: Array) -> NDArray[np.bool_]:
         """Whether rods (m,) of photograph k touch a wall that has ends (t, 2, 2): (t, m)."""
         return np.abs(self.gaps(k, rows, ends[:, None])) < self.width

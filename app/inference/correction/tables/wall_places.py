@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import theilslopes
 
 from ....solver.bodies.grains import Array
-from ....solver.bodies.wall_shapes import outward_normals
+from ....solver.bodies.wall_shapes import directions, outward_normals
 from ....solver.calibration.equations import move_walls
 from ....tracks import Tracks, WallTracks
 from .rods_at_walls import RodsAtWalls
@@ -158,7 +158,6 @@ def _measure(rods: RodsAtWalls, walls: WallTracks, w: int) -> _Gaps:
     frames = []
     for k, ends in enumerate(walls.endpoints[:, w]):
         rows, gap = rods.beside(k, ends)
-        along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
-        frames.append(np.stack([gap, (rods.tracks.position[k, rows] - ends.mean(axis=0)) @ along]))
+        frames.append(np.stack([gap, (rods.tracks.position[k, rows] - ends.mean(axis=0)) @ directions(ends)]))
     length = float(np.linalg.norm(walls.endpoints[0, w, 1] - walls.endpoints[0, w, 0]))
     return _Gaps(frames, rods.width, rods.reach, length)

@@ -138,10 +138,7 @@ def _motion(rods: RodsAtWalls, k: int, rows: NDArray[np.intp], ends: Array) -> A
     middle, slope = float(np.median(gap)), 0.0
     if len(rows) >= FEWEST_TURNING and np.ptp(place) > SPREAD:
         slope, middle = np.asarray(theilslopes(gap, place)[:2], dtype=np.float64).tolist()
-    turned = np.nan_to_num(tracks.rotation[k, rows] - tracks.rotation[k - 1, rows])
-    around = np.array([-normal[1], normal[0]])  # motion of the point at the wall for a unit of rotation and radius
-    moved = tracks.position[k, rows] - tracks.position[k - 1, rows]
-    slid = float(np.median(moved @ along + turned * tracks.radius[rows] * (around @ along)))
+    slid = float(np.median(rods.surface_motion(k, rows, along)))
     return slid * along - (middle + slope * np.array([[0.0], [1.0]])) * normal
 
 
