@@ -18,6 +18,7 @@ from ..even_subset import even_subset
 from .touching_pairs import SIGNIFICANT, count_classes, find_near_pairs, fit_touching_pairs
 
 MIN_GAP, MAX_RANGE = 0.1, 0.12  # over the mean radius: between sizes, and of the readings of one size
+CLOSE_GAP = 0.03  # between sizes that are alike, such as 7 and 8 mm read with errors of 1 %
 MAX_SIZES, MIN_GRAINS = 4, 10
 # Fraction of the grains, and distance over the mean radius: fewer grains so near a size are misread, not a size.
 RARE, NEAR_SIZE = 0.02, 0.14
@@ -35,6 +36,7 @@ class SizeClasses:
     error_fraction: float  # of a reading's deviation from its class that is error, 0 … 1
     error_fraction_sd: float
     radius: Float[Array, " n"]  # [m]
+    class_error: Float[Array, " q"]  # [m] to be added to the radii of a class, if touching surfaces just meet
 
     def describe(self) -> str:
         """Describe the correction in a sentence."""
@@ -52,14 +54,21 @@ def group_readings(radius: Float[Array, " n"]) -> Int[np.ndarray, " n"] | None:
 
     Notes
     -----
-    Sorted readings are separated where neighbours differ by more than 0.1 of the mean. There are classes if no more
-    than four remain, each with a range of at most 0.12 of its mean. Less than 2 % of the grains within 0.14 of the mean
-    radius of another size, as medians of changing readings, belong to that size.
+    Sorted readings are separated where neighbours differ by more than 0.1 of the mean, or by 0.03 where that leaves no
+    classes. There are classes if no more than four remain, each with a range of at most 0.12 of its mean. Less than 2 %
+    of the grains within 0.14 of the mean radius of another size, as medians of changing readings, belong to that size.
     """
     if len(radius) < MIN_GRAINS:
         return None
-    groups = _split(radius)
+    found = (_group(radius, _split(radius, gap)) for gap in (MIN_GAP, CLOSE_GAP))
+    return next((each for each in found if each is not None), None)
+
+
+def _group(radius: Array, groups: list[NDArray[np.intp]]) -> NDArray[np.integer] | None:
+    """Size class of every grain by groups of readings; None where these are no sizes."""
     common = [group for group in groups if len(group) >= RARE * len(radius)]
+    if not common:
+        return None
     sizes = np.array([radius[group].mean() for group in common])
     rare = [group for group in groups if len(group) < RARE * len(radius)]
     apart = [group for group in rare if np.abs(sizes - radius[group].mean()).min() > NEAR_SIZE * radius.mean()]
@@ -96,10 +105,10 @@ def find_common_sizes(radius: Float[Array, " n"]) -> tuple[Float[Array, " q"], B
     return (np.array(sizes), other) if len(sizes) <= MAX_SIZES and other.mean() <= 1.0 - COMMON else None
 
 
-def _split(radius: Array) -> list[NDArray[np.intp]]:
-    """Groups of readings, ascending, that are separated by more than MIN_GAP."""
+def _split(radius: Array, gap: float = MIN_GAP) -> list[NDArray[np.intp]]:
+    """Groups of readings, ascending, that are separated by more than a gap, over the mean."""
     order = np.argsort(radius, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(radius[order]) > MIN_GAP * radius.mean()) + 1)
+    return np.split(order, np.flatnonzero(np.diff(radius[order]) > gap * radius.mean()) + 1)
 
 
 def find_size_classes(
@@ -150,4 +159,5 @@ def find_size_classes(
     fraction, sd = float(np.clip(found.value[0], 0.0, 1.0)), float(found.sd[0])
     if not found.value[0] > SIGNIFICANT * sd:
         return None
-    return SizeClasses(size_class, size, fraction, sd, size[size_class] + (1.0 - fraction) * deviation)
+    radius = size[size_class] + (1.0 - fraction) * deviation
+    return SizeClasses(size_class, size, fraction, sd, radius, found.value[1:])

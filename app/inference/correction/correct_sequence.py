@@ -24,7 +24,7 @@ from .boundary import correct_camera, correct_walls, measure_noise
 from .calibration import calibrate_tracks, known_radii, own_gap_error, radius_classes
 from .close_photographs import choose_span, count_alike
 from .friction import measure_friction, measure_resisting, refine_wall_friction, tuned_radii, use_unstated
-from .radii import calibrate_with_radii, correct_exchanged_sizes, use_size_classes
+from .radii import calibrate_with_radii, correct_exchanged_sizes, use_size_classes, use_sizes_of_hard
 from .soft_grain_errors import correct_soft_grains
 from .softness import assume_softness, find_softness
 from .tables.outliers import remove_outliers, restore_exchanged_ids
@@ -96,6 +96,8 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         # Overlaps of soft grains are forces: calibration would remove them as errors.
         settings = replace(settings, sequence=sequence, calibration=None if sequence.soft else settings.calibration)
     if settings.calibration is not None:
+        if settings.sequence.uses_positions:
+            tracks, remarks["size_classes"] = use_sizes_of_hard(tracks)
         observed = settings.calibration, tracks, walls, overlap, failed
         if settings.sequence.uses_positions:
             tracks, walls, calibration = calibrate_with_radii(material, *observed)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rodsight.inference.correction import radii
 from rodsight.inference.correction.calibration import calibrate_tracks
-from rodsight.inference.correction.radii import calibrate_with_radii, use_size_classes
+from rodsight.inference.correction.radii import calibrate_with_radii, use_size_classes, use_sizes_of_hard
 from rodsight.solver.bodies.motion import Snapshot
 from rodsight.solver.bodies.packing import Packing
 from rodsight.solver.bodies.rods import RodMaterial
@@ -93,11 +93,36 @@ def test_radii_are_estimated_without_the_errors_that_all_grains_share(monkeypatc
     assert endpoints[:, :, 1].min() == pytest.approx(walls.endpoints[0, :, :, 1].min() - 2e-5)  # the bottom
 
 
-def test_sizes_replace_readings_of_soft_grains_only(monkeypatch: pytest.MonkeyPatch) -> None:
+def as_read(tracks: Tracks, error: float = 0.0) -> Tracks:
+    """Tracks of grains whose radii were read with errors of .5 %, and a common relative one."""
+    sign = np.tile([-1.0, 1.0], tracks.grain_count)[: tracks.grain_count]
+    return replace(tracks, radius=tracks.radius * (1.0 + error + 5e-3 * sign))
+
+
+def test_touching_surfaces_meet_with_the_sizes_of_hard_grains(monkeypatch: pytest.MonkeyPatch) -> None:
     tracks, _ = lattice()
-    read = replace(
-        tracks, radius=tracks.radius * (1.0 + 5e-3 * np.tile([-1.0, 1.0], tracks.grain_count)[: len(tracks.radius)])
+    monkeypatch.setattr(size_classes, "FEWEST_PAIRS", 10)
+    found, remark = use_sizes_of_hard(as_read(tracks, 0.01))
+    assert found.radius == pytest.approx(tracks.radius, rel=1e-3)
+    assert "1 size" in remark
+    assert use_sizes_of_hard(tracks) == (tracks, "")
+
+
+def test_readings_of_hard_grains_stay_where_gaps_leave_their_errors_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    tracks, _ = lattice()
+    read = as_read(tracks)
+    found = size_classes.SizeClasses(
+        np.zeros(tracks.grain_count, int), np.ones(1), 1.0, radii.UNCERTAIN + 0.01, tracks.radius, np.zeros(1)
     )
+    monkeypatch.setattr(radii, "find_size_classes", lambda *_: found)
+    assert use_sizes_of_hard(read) == (read, "")
+    monkeypatch.setattr(radii, "find_size_classes", lambda *_: replace(found, error_fraction_sd=radii.UNCERTAIN))
+    np.testing.assert_array_equal(use_sizes_of_hard(read)[0].radius, tracks.radius)
+
+
+def test_only_sizes_of_grains_that_are_stated_to_be_soft_keep_their_overlaps(monkeypatch: pytest.MonkeyPatch) -> None:
+    tracks, _ = lattice()
+    read = as_read(tracks)
     monkeypatch.setattr(size_classes, "FEWEST_PAIRS", 10)
     for stiffness in (None, "rigid"):
         found, remark = use_size_classes(RodMaterial(stiffness=stiffness), read)

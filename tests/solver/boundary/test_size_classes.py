@@ -37,6 +37,16 @@ def test_errors_of_readings_are_removed_and_sizes_stay() -> None:
     assert "2 sizes" in found.describe()
 
 
+def test_sizes_that_are_alike_are_distinguished() -> None:
+    rng = np.random.default_rng(6)
+    true = rng.choice([7e-3, 8e-3, 11e-3], COUNT**2)
+    found = find_size_classes(pack_rows(true), true * (1.0 + 0.01 * rng.normal(size=COUNT**2)))
+    assert found is not None
+    assert len(found.size) == 3
+    assert found.error_fraction > 0.95
+    assert (found.radius - true).std() < 2e-5
+
+
 def test_grains_that_truly_differ_keep_their_readings() -> None:
     """Two sizes whose grains vary by 2 %, and readings that are right: no class mean replaces them."""
     true = two_sizes() * (1.0 + 0.02 * np.random.default_rng(3).uniform(-1.0, 1.0, COUNT**2))
