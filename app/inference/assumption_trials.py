@@ -8,6 +8,7 @@ a stretching in another direction and of another size than the true one.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -17,7 +18,7 @@ from ..process.progress import Progress, no_progress
 from ..solver.boundary.camera_distortion import ANISOTROPY
 from .corrected_sequence import CorrectedSequence
 from .correction.correct_sequence import correct_sequence
-from .diagnosis.trial import PREDICTED_PHOTOGRAPHS, remainder, select_window, solve_trial, trial_score
+from .diagnosis.trial import PREDICTED_PHOTOGRAPHS, Trial, remainder, select_window, solve_trial, try_rival
 from .inputs import Inputs, Stretching
 
 # Expected r from which on an assumption is not compared: forces that fit leave little to gain.
@@ -79,7 +80,7 @@ def correct_by_trial(inputs: Inputs, progress: Progress = no_progress) -> tuple[
     others = [each for each in others if trial.expected[0] < each.fits]
     rises = []
     for done, each in enumerate(others, start=1):
-        rises.append(trial_score(_with_seen_rods(each.inputs)) - trial.score)
+        rises.append(_rise(trial, try_rival(_with_seen_rods(each.inputs))))
         progress("comparing assumptions", done, len(others))
     rise = max(rises, default=0.0)
     if not rise > SHOWN:
@@ -91,6 +92,19 @@ def correct_by_trial(inputs: Inputs, progress: Progress = no_progress) -> tuple[
     if used.material.stiffness != inputs.material.stiffness:
         remark += ' (if grains are hard: material.stiffness = "rigid")'
     return used, correct_sequence(used).with_remark(remark)
+
+
+def _rise(given: Trial, other: Trial | None) -> float:
+    """Rise of arctanh r by an assumption; −∞ where it cannot be true.
+
+    What is expected of overlaps rests on balance. Without a load it leaves so much open that errors of radii fulfil it,
+    too: soft grains must then agree with the motion at least as well as hard ones.
+    """
+    if other is None:
+        return -math.inf
+    if other.soft and not given.soft and not given.loaded and not other.agreement >= given.agreement:
+        return -math.inf
+    return other.score - given.score
 
 
 def _with_seen_rods(inputs: Inputs) -> Inputs:

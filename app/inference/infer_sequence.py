@@ -88,14 +88,15 @@ def infer_sequence(
     """
     observer = InferenceObserver() if observer is None else observer
     store = MemoryStore() if store is None else store
+    beginning = None
     if complete:
         inputs, sequence = correct_by_trial(inputs, observer.progress)
-        sequence = correct_hard_grains(sequence, observer.progress)
+        sequence, beginning = correct_hard_grains(sequence, observer)
     else:
         sequence = correct_sequence(inputs)
     release_free_memory()  # of equations of all photographs
     observer.corrected(sequence)
-    solve_frames(sequence, store, observer)
+    solve_frames(sequence, store, observer, beginning)
     frames, statistics = store.sequences(len(sequence.snapshots))
     unsolved = replace(
         sequence.unsolved_results(), base_friction=sequence.packing.material.base_drag / sequence.base_gravity

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain, islice
 
 import numpy as np
 
@@ -42,18 +44,55 @@ class InferenceObserver:
         """A frame failed in a stage; the others continue."""
 
 
-def solve_frames(sequence: CorrectedSequence, store: FrameStore, observer: InferenceObserver) -> None:
-    """Solve the frames that the store lacks, each from the state of the one before it."""
+@dataclass(frozen=True, slots=True)
+class Beginning:
+    """The first frames of a sequence, solved to judge it, and the others, which are solved as they are read."""
+
+    frames: tuple[SolvedFrame, ...]
+    others: Iterator[SolvedFrame]
+
+
+def solve_beginning(sequence: CorrectedSequence, count: int, observer: InferenceObserver | None = None) -> Beginning:
+    """Solve up to `count` first frames as `solve_frames` does, which may continue with the others."""
+    solved = _solve(sequence, SequencePart(whole=True), InferenceObserver() if observer is None else observer)
+    return Beginning(tuple(islice(solved, count)), solved)
+
+
+def solve_frames(
+    sequence: CorrectedSequence, store: FrameStore, observer: InferenceObserver, beginning: Beginning | None = None
+) -> None:
+    """Solve the frames that the store lacks, each from the state of the one before it.
+
+    Parameters
+    ----------
+    sequence : CorrectedSequence
+    store : FrameStore
+    observer : InferenceObserver
+    beginning : Beginning, optional
+        Of the same sequence; an empty store receives its frames.
+    """
     total = len(sequence.snapshots)
     done = min(store.finished(), total)
-    span = sequence.settings.used_span
-    states = [store.load(k).state for k in range(max(done - span, 0), done)]
     observer.restored(store, done)
     observer.progress("solving", done, total)
     if done == total:
         return
+    if done == 0 and beginning is not None:
+        solved = chain(beginning.frames, beginning.others)
+    else:
+        span = sequence.settings.used_span
+        states = [store.load(k).state for k in range(max(done - span, 0), done)]
+        solved = _solve(sequence, SequencePart(done, states, whole=True), observer)
+    for frame in solved:
+        store.save(frame)
+        observer.solved(frame)
+        observer.progress("solving", frame.forces.frame + 1, total)
+
+
+def _solve(sequence: CorrectedSequence, part: SequencePart, observer: InferenceObserver) -> Iterator[SolvedFrame]:
+    """Solve frames one after the other, with their statistics."""
     solved = solve_sequence(
-        sequence.packing, sequence.snapshots, sequence.settings, SequencePart(done, states, whole=True),
+        sequence.packing, sequence.snapshots, sequence.settings, part,
         verdicts=sequence.verdicts, failed=sequence.failed, observer=partial(observer.failed, "solving"),
     )  # fmt: skip
     for forces, state in prefetch(solved, sequence.settings.workers):
@@ -67,10 +106,7 @@ def solve_frames(sequence: CorrectedSequence, store: FrameStore, observer: Infer
             reason = f"its statistics could not be computed ({describe_error(error)})"
             members = sequence.settings.keep_members
             forces, statistics = failed_frame(forces.frame, reason, n, w, with_members=members), no_statistics(w)
-        frame = SolvedFrame(with_remarks(sequence, forces), statistics, state)
-        store.save(frame)
-        observer.solved(frame)
-        observer.progress("solving", forces.frame + 1, total)
+        yield SolvedFrame(with_remarks(sequence, forces), statistics, state)
 
 
 def with_remarks(sequence: CorrectedSequence, forces: FrameForces) -> FrameForces:

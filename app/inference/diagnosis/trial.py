@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...process.counts import mean_of_known
 from ...process.errors import UndeterminedError
 from ...process.machine.linear_algebra import one_thread_each
 from ...solver.assessment.evidence import Evidence
@@ -58,6 +59,16 @@ class Trial:
         return float(np.mean(found)) if found else -math.inf
 
     @property
+    def agreement(self) -> float:
+        """Mean correlation of the forces from the motion with those from the positions alone; NaN where not known."""
+        return mean_of_known(each.agreement for each in self.evidence)
+
+    @property
+    def loaded(self) -> bool:
+        """Whether a known load or the weight sets the scale."""
+        return all(each.loaded for each in self.evidence)
+
+    @property
     def soft(self) -> bool:
         """Whether the gaps are overlaps that forces make."""
         return any(each.information.soft for each in self.evidence)
@@ -104,8 +115,10 @@ def solve_trial(
     if given.tracks.frame_count < 2:
         return None
     store, observer = MemoryStore(), InferenceObserver() if observer is None else observer
-    sequence = correct_sequence(given) if corrected is None else corrected
-    solve_frames(correct_hard_grains(sequence, observer.progress) if by_forces else sequence, store, observer)
+    sequence, beginning = correct_sequence(given) if corrected is None else corrected, None
+    if by_forces:
+        sequence, beginning = correct_hard_grains(sequence, observer)
+    solve_frames(sequence, store, observer, beginning)
     judged = store.frames[min(SETTLED, len(store.frames) - 1) :]
     judged = [each for each in judged if each.state.evidence.assessed]
     if not judged:
@@ -122,12 +135,17 @@ def select_window(inputs: Inputs, photographs: int = TRIAL_PHOTOGRAPHS, first: i
     return replace(inputs, tracks=tracks, walls=walls, settings=inputs.settings.without_sweeps()), stride
 
 
+def try_rival(inputs: Inputs, first: int = 0) -> Trial | None:
+    """Solve a trial of other inputs; None where they allow none."""
+    try:
+        return solve_trial(inputs, first=first)
+    except (UndeterminedError, ValueError, FloatingPointError):  # a rival that cannot be true
+        return None
+
+
 def trial_score(inputs: Inputs, first: int = 0) -> float:
     """Score of a trial solution; −∞ where the input allows none."""
-    try:
-        trial = solve_trial(inputs, first=first)
-    except (UndeterminedError, ValueError, FloatingPointError):  # a rival that cannot be true
-        return -math.inf
+    trial = try_rival(inputs, first)
     return -math.inf if trial is None else trial.score
 
 

@@ -69,17 +69,21 @@ def described(inputs: Inputs) -> str:
     return f"x {x:+.2g} %" if y == 0.0 else f"y {y:+.2g} %"
 
 
-def solved(monkeypatch, expected: float, rises: dict[str, float]) -> list[str]:
+def solved(monkeypatch, expected: float, rises: dict[str, float], *, loaded: bool = True) -> list[str]:
     """Let trials of the given input have this expected r, and others rise by so much; return what was solved."""
     tried = []
 
     def trial(inputs):
         assert not inputs.settings.infer_unseen  # rods that no photograph shows
         tried.append(described(inputs))
-        return SimpleNamespace(expected=(expected, 0.0, 1.0), score=1.0)
+        soft = tried[-1] == "soft"
+        return SimpleNamespace(
+            expected=(expected, 0.0, 1.0), score=1.0 + rises.get(tried[-1], 0.0), loaded=loaded, soft=soft,
+            agreement=0.69 if soft else 0.7,
+        )  # fmt: skip
 
     monkeypatch.setattr(module, "solve_trial", trial)
-    monkeypatch.setattr(module, "trial_score", lambda inputs: trial(inputs).score + rises.get(tried[-1], 0.0))
+    monkeypatch.setattr(module, "try_rival", trial)
     return tried
 
 
@@ -102,6 +106,20 @@ def test_hard_grains_stay_hard_where_that_is_no_clear_gain_or_they_fit(inputs, c
     used, _ = correct_by_trial(inputs)
     assert used is inputs
     assert corrected.inputs == [inputs]
+
+
+def test_without_a_load_soft_grains_must_agree_with_the_motion_as_well_as_hard_ones(inputs, corrected, monkeypatch):
+    corrected.hide(Sequence(softness_hidden=True))
+    solved(monkeypatch, 0.7, {"soft": SHOWN + 1.0}, loaded=False)
+    used, _ = correct_by_trial(inputs)
+    assert used is inputs
+
+
+def test_an_assumption_that_cannot_be_solved_is_not_used(inputs, corrected, monkeypatch):
+    corrected.hide(Sequence(softness_hidden=True))
+    solved(monkeypatch, 0.7, {})
+    monkeypatch.setattr(module, "try_rival", lambda inputs: None)
+    assert correct_by_trial(inputs)[0] is inputs
 
 
 def test_the_axis_along_which_lengths_fit_better_is_rescaled(inputs, corrected, monkeypatch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numba
 import numpy as np
@@ -11,6 +12,7 @@ from rodsight.inference.correction import hard_grain_errors as module
 from rodsight.inference.correction.errors_by_forces import without_own_corrections
 from rodsight.inference.correction.hard_grain_errors import FITS, PASSES, correct_hard_grains
 from rodsight.inference.infer_sequence import infer_sequence
+from rodsight.inference.solve_frames import Beginning
 from rodsight.solver.calibration.grain_errors import GrainErrors
 from rodsight.solver.frame_forces import FrameStatus
 
@@ -29,7 +31,11 @@ def uncertain(wrong_centres, monkeypatch):
             solved.append(sequence)
             return [replace(each, expected_correlation=expected, status=status) for each in wrong_centres.frames]
 
+        def solve_beginning(sequence, count, observer):
+            return Beginning(tuple(SimpleNamespace(forces=each) for each in solve_first(sequence, count)), iter(()))
+
         monkeypatch.setattr(module, "solve_first", solve_first)
+        monkeypatch.setattr(module, "solve_beginning", solve_beginning)
         return solved
 
     return expect
@@ -38,7 +44,8 @@ def uncertain(wrong_centres, monkeypatch):
 def test_errors_are_found_anew_where_the_motion_shows_little(wrong_centres, uncertain):
     solved = uncertain(FITS - 0.01)
     sequence = wrong_centres.sequence
-    found = correct_hard_grains(sequence)
+    found, beginning = correct_hard_grains(sequence)
+    assert beginning is None  # it is that of another sequence
     assert len(solved) == PASSES
     assert solved[0] is sequence
     assert solved[1] is not sequence  # repeated with better forces
@@ -65,14 +72,14 @@ def test_the_errors_are_the_mean_over_the_passes_and_the_calibration(wrong_centr
         return GrainErrors(np.full((n, 2), 1e-6 * next(number)), np.zeros(n), 0.0, np.zeros((5, 3 * n))), 1.0
 
     monkeypatch.setattr(module, "find_errors", find)
-    found = correct_hard_grains(sequence)
+    found, _ = correct_hard_grains(sequence)
     np.testing.assert_allclose(found.calibration.offset, (sequence.calibration.offset + 16e-6) / (PASSES + 1))
 
 
 def test_errors_of_radii_are_left_to_calibration(wrong_centres, uncertain, monkeypatch):
     solved = uncertain(FITS - 0.01)
     monkeypatch.setattr(module, "size_of_errors", lambda evidence: (1e-5, 1e-5))
-    assert correct_hard_grains(wrong_centres.sequence) is wrong_centres.sequence
+    assert correct_hard_grains(wrong_centres.sequence)[0] is wrong_centres.sequence
     assert solved == []
 
 
@@ -81,7 +88,17 @@ def test_errors_of_radii_are_left_to_calibration(wrong_centres, uncertain, monke
 )
 def test_errors_stay_where_the_motion_confirms_forces_or_contradicts_them(wrong_centres, uncertain, expected, status):
     uncertain(expected, status)
-    assert correct_hard_grains(wrong_centres.sequence) is wrong_centres.sequence
+    sequence, beginning = correct_hard_grains(wrong_centres.sequence)
+    assert sequence is wrong_centres.sequence
+    assert beginning is not None
+    assert len(beginning.frames) == len(wrong_centres.frames)
+
+
+def test_frames_of_many_rods_are_not_kept(wrong_centres, uncertain, monkeypatch):
+    solved = uncertain(FITS + 0.01)
+    monkeypatch.setattr(module, "MOST_POSES", 12 * wrong_centres.sequence.tracks.grain_count - 1)
+    assert correct_hard_grains(wrong_centres.sequence) == (wrong_centres.sequence, None)
+    assert len(solved) == 1
 
 
 @pytest.mark.parametrize("change", [{"soft": True}, {"positions": "never"}])
@@ -89,9 +106,9 @@ def test_nothing_is_solved_for_soft_rods_or_without_positions(wrong_centres, unc
     solved = uncertain(0.1)
     sequence = wrong_centres.sequence
     other = replace(sequence, settings=replace(sequence.settings, **change))
-    assert correct_hard_grains(other) is other
+    assert correct_hard_grains(other) == (other, None)
     other = replace(sequence, calibration=None)
-    assert correct_hard_grains(other) is other
+    assert correct_hard_grains(other) == (other, None)
     assert solved == []
 
 
@@ -100,7 +117,8 @@ def test_nothing_is_solved_for_soft_rods_or_without_positions(wrong_centres, unc
 def test_forces_of_rods_at_rest_become_more_accurate(tmp_path, scenario, rise, monkeypatch):
     solved = solve(tmp_path, scenario, 43, grains=150)
     after = infer_sequence(solved.inputs)
-    monkeypatch.setattr("rodsight.inference.infer_sequence.correct_hard_grains", lambda sequence, progress: sequence)
+    unchanged = "rodsight.inference.infer_sequence.correct_hard_grains"
+    monkeypatch.setattr(unchanged, lambda sequence, observer: (sequence, None))
     before = infer_sequence(solved.inputs)
     r = np.array([[agreement(each, solved.true[each.frame]) for each in some.frames] for some in (before, after)])
     assert r[1].mean() > r[0].mean() + rise

@@ -30,7 +30,7 @@ def solve_into(monkeypatch, evidence: list[Evidence]) -> list[Inputs]:
     solved: list[Inputs] = []
     monkeypatch.setattr(module, "correct_sequence", solved.append)
 
-    def solve_frames(_, store, observer) -> None:
+    def solve_frames(_, store, observer, beginning) -> None:
         store.frames.extend(
             SimpleNamespace(state=SimpleNamespace(evidence=each), forces=0.5 + each.correction) for each in evidence
         )
@@ -58,12 +58,13 @@ def test_frames_without_a_history_or_an_assessment_are_not_judged(inputs, monkey
 
 def test_errors_of_centres_are_found_by_forces_on_request(inputs, monkeypatch) -> None:
     solve_into(monkeypatch, [EVIDENCE])
-    found: list[object] = []
-    monkeypatch.setattr(module, "correct_hard_grains", lambda sequence, progress: found.append(sequence))
+    solved: list[tuple[object, object]] = []
+    monkeypatch.setattr(module, "solve_frames", lambda sequence, _, __, beginning: solved.append((sequence, beginning)))
+    monkeypatch.setattr(module, "correct_hard_grains", lambda sequence, observer: ("found", "beginning"))
     solve_trial(inputs)
-    assert found == []
+    assert solved == [(None, None)]
     solve_trial(inputs, by_forces=True)
-    assert len(found) == 1
+    assert solved[1] == ("found", "beginning")
 
 
 def test_corrected_photographs_are_not_corrected_again(inputs, monkeypatch) -> None:
