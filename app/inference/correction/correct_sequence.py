@@ -24,7 +24,7 @@ from .boundary import correct_camera, correct_walls, measure_noise
 from .calibration import calibrate_tracks, known_radii, own_gap_error, radius_classes
 from .close_photographs import choose_span, count_alike
 from .friction import measure_friction, measure_resisting, refine_wall_friction, tuned_radii, use_unstated
-from .radii import calibrate_with_radii, correct_exchanged_sizes, use_size_classes, use_sizes_of_hard
+from .radii import calibrate_with_radii, correct_exchanged_sizes, use_size_classes
 from .soft_grain_errors import correct_soft_grains
 from .softness import assume_softness, find_softness
 from .tables.outliers import remove_outliers, restore_exchanged_ids
@@ -80,7 +80,8 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     if settings.calibration is not None:
         if settings.sequence.uses_positions:
             material, remarks["softness"] = assume_softness(material, tracks, walls, failed)
-        tracks, remarks["size_classes"] = use_size_classes(material, tracks)
+        if material.stiffness not in (None, "rigid"):
+            tracks, remarks["size_classes"] = use_size_classes(tracks, soft=True)
     if settings.boundary is not None:
         if inputs.seeks_distortion:
             tracks, walls, remarks["camera"], lens = correct_camera(
@@ -93,11 +94,11 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         tracks, walls, boundary = correct_walls(settings.boundary, tracks, walls)
     if settings.calibration is not None:
         sequence, hidden = find_softness(material, settings.sequence, tracks, walls, failed)
+        if sequence.uses_positions and not remarks["size_classes"]:  # readings show whether grains are soft
+            tracks, remarks["size_classes"] = use_size_classes(tracks, soft=sequence.soft)
         # Overlaps of soft grains are forces: calibration would remove them as errors.
         settings = replace(settings, sequence=sequence, calibration=None if sequence.soft else settings.calibration)
     if settings.calibration is not None:
-        if settings.sequence.uses_positions:
-            tracks, remarks["size_classes"] = use_sizes_of_hard(tracks)
         observed = settings.calibration, tracks, walls, overlap, failed
         if settings.sequence.uses_positions:
             tracks, walls, calibration = calibrate_with_radii(material, *observed)

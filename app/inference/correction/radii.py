@@ -68,22 +68,18 @@ def correct_exchanged_sizes(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, 
     return replace(tracks, radius=radius), sentence
 
 
-def use_sizes_of_hard(tracks: Tracks) -> tuple[Tracks, str]:
-    """Replace readings of the radii of hard grains by their nominal sizes, with which touching surfaces meet.
+def use_size_classes(tracks: Tracks, *, soft: bool) -> tuple[Tracks, str]:
+    """Replace readings of the radii by nominal sizes, as far as touching pairs show that the deviations are errors.
 
-    Calibration finds errors of single radii, too, but not apart from those of centres and from gaps of pairs that do
-    not touch. Returned as by `use_size_classes`, unchanged where gaps leave open how much of the deviations is error.
-    """
-    found = find_size_classes(tracks.position, tracks.radius, tracks.boundary) if tracks.grain_count else None
-    if found is None or found.error_fraction_sd > UNCERTAIN:
-        return tracks, ""
-    return replace(tracks, radius=found.radius + found.class_error[found.size_class]), found.describe()
+    Overlaps of soft grains are forces: their mean stays that of the readings. Surfaces of touching hard grains meet.
+    Calibration finds errors of single radii of these, too, but not apart from those of centres and from gaps of pairs
+    that do not touch.
 
-
-def use_size_classes(material: RodMaterial, tracks: Tracks) -> tuple[Tracks, str]:
-    """Replace readings of the radii of soft grains by their nominal sizes, as far as touching pairs support them.
-
-    Overlaps of soft grains are forces, so that only the classes of their sizes show errors of their radii.
+    Parameters
+    ----------
+    tracks : Tracks
+    soft : bool
+        Whether grains are soft.
 
     Returns
     -------
@@ -91,10 +87,11 @@ def use_size_classes(material: RodMaterial, tracks: Tracks) -> tuple[Tracks, str
     str
         A sentence on the correction; empty: none.
     """
-    if material.stiffness in (None, "rigid") or tracks.grain_count == 0:
+    found = find_size_classes(tracks.position, tracks.radius, tracks.boundary) if tracks.grain_count else None
+    if found is None or (not soft and found.error_fraction_sd > UNCERTAIN):
         return tracks, ""
-    found = find_size_classes(tracks.position, tracks.radius, tracks.boundary)
-    return (tracks, "") if found is None else (replace(tracks, radius=found.radius), found.describe())
+    shared = 0.0 if soft else found.class_error[found.size_class]
+    return replace(tracks, radius=found.radius + shared), found.describe()
 
 
 def calibrate_with_radii(

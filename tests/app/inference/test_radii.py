@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rodsight.inference.correction import radii
 from rodsight.inference.correction.calibration import calibrate_tracks
-from rodsight.inference.correction.radii import calibrate_with_radii, use_size_classes, use_sizes_of_hard
+from rodsight.inference.correction.radii import calibrate_with_radii, use_size_classes
 from rodsight.solver.bodies.motion import Snapshot
 from rodsight.solver.bodies.packing import Packing
 from rodsight.solver.bodies.rods import RodMaterial
@@ -102,10 +102,10 @@ def as_read(tracks: Tracks, error: float = 0.0) -> Tracks:
 def test_touching_surfaces_meet_with_the_sizes_of_hard_grains(monkeypatch: pytest.MonkeyPatch) -> None:
     tracks, _ = lattice()
     monkeypatch.setattr(size_classes, "FEWEST_PAIRS", 10)
-    found, remark = use_sizes_of_hard(as_read(tracks, 0.01))
+    found, remark = use_size_classes(as_read(tracks, 0.01), soft=False)
     assert found.radius == pytest.approx(tracks.radius, rel=1e-3)
     assert "1 size" in remark
-    assert use_sizes_of_hard(tracks) == (tracks, "")
+    assert use_size_classes(tracks, soft=False) == (tracks, "")
 
 
 def test_readings_of_hard_grains_stay_where_gaps_leave_their_errors_open(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,22 +115,16 @@ def test_readings_of_hard_grains_stay_where_gaps_leave_their_errors_open(monkeyp
         np.zeros(tracks.grain_count, int), np.ones(1), 1.0, radii.UNCERTAIN + 0.01, tracks.radius, np.zeros(1)
     )
     monkeypatch.setattr(radii, "find_size_classes", lambda *_: found)
-    assert use_sizes_of_hard(read) == (read, "")
+    assert use_size_classes(read, soft=False) == (read, "")
     monkeypatch.setattr(radii, "find_size_classes", lambda *_: replace(found, error_fraction_sd=radii.UNCERTAIN))
-    np.testing.assert_array_equal(use_sizes_of_hard(read)[0].radius, tracks.radius)
+    np.testing.assert_array_equal(use_size_classes(read, soft=False)[0].radius, tracks.radius)
 
 
-def test_only_sizes_of_grains_that_are_stated_to_be_soft_keep_their_overlaps(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_mean_overlap_of_soft_grains_stays_that_of_the_readings(monkeypatch: pytest.MonkeyPatch) -> None:
     tracks, _ = lattice()
-    read = as_read(tracks)
+    read = as_read(tracks, 0.01)
     monkeypatch.setattr(size_classes, "FEWEST_PAIRS", 10)
-    for stiffness in (None, "rigid"):
-        found, remark = use_size_classes(RodMaterial(stiffness=stiffness), read)
-        assert found is read
-        assert remark == ""
-    found, remark = use_size_classes(RodMaterial(stiffness="estimate"), read)
-    assert found.radius == pytest.approx(tracks.radius, rel=1e-3)
+    found, remark = use_size_classes(read, soft=True)
+    assert found.radius == pytest.approx(np.full(tracks.grain_count, read.radius.mean()), rel=1e-3)
     assert "1 size" in remark
-    exact, remark = use_size_classes(RodMaterial(stiffness=1e6), tracks)
-    assert exact is tracks
-    assert remark == ""
+    assert use_size_classes(tracks, soft=True) == (tracks, "")

@@ -403,9 +403,8 @@ MUTANTS = [
     *mutants_of(
         "app/inference/correction/radii.py",
         f"{TESTS}/test_radii.py",
-        ('material.stiffness in (None, "rigid")', "material.stiffness is None"),
-        ("or found.error_fraction_sd > UNCERTAIN", ""),
-        ("found.radius + found.class_error[found.size_class]", "found.radius"),
+        ("(not soft and found.error_fraction_sd > UNCERTAIN)", "False"),
+        ("shared = 0.0 if soft else found", "shared = found"),
         ("np.full(tracks.grain_count, remaining)", "np.full(tracks.grain_count, 0.0)"),
         ("if tracks.centre_sigma is None or not then.applied:", "if False:"),
         ("before=first.before", "before=then.before"),
