@@ -64,6 +64,11 @@ class Trial:
         return mean_of_known(each.agreement for each in self.evidence)
 
     @property
+    def overlap_agreement(self) -> float:
+        """The same of the forces from positions with the motion-free balance of the overlaps."""
+        return mean_of_known(each.position_agreement for each in self.evidence)
+
+    @property
     def loaded(self) -> bool:
         """Whether a known load or the weight sets the scale."""
         return all(each.loaded for each in self.evidence)

@@ -10,8 +10,10 @@ import pytest
 from rodsight.experiment.experiment import load_experiment
 from rodsight.inference import assumption_trials as module
 from rodsight.inference.assumption_trials import (
-    FITS_HARD,
-    FITS_STRETCHED,
+    CONFIRMED,
+    FITS,
+    LEAST,
+    OVERLAPS_FIT,
     SHOWN,
     correct_by_trial,
     inputs_as_used,
@@ -69,7 +71,15 @@ def described(inputs: Inputs) -> str:
     return f"x {x:+.2g} %" if y == 0.0 else f"y {y:+.2g} %"
 
 
-def solved(monkeypatch, expected: float, rises: dict[str, float], *, loaded: bool = True) -> list[str]:
+def solved(
+    monkeypatch,
+    expected: float,
+    rises: dict[str, float],
+    *,
+    loaded: bool = True,
+    agreement: float = 0.69,
+    overlaps: float = OVERLAPS_FIT,
+) -> list[str]:
     """Let trials of the given input have this expected r, and others rise by so much; return what was solved."""
     tried = []
 
@@ -79,7 +89,7 @@ def solved(monkeypatch, expected: float, rises: dict[str, float], *, loaded: boo
         soft = tried[-1] == "soft"
         return SimpleNamespace(
             expected=(expected, 0.0, 1.0), score=1.0 + rises.get(tried[-1], 0.0), loaded=loaded, soft=soft,
-            agreement=0.69 if soft else 0.7,
+            agreement=agreement if soft else 0.7, overlap_agreement=overlaps,
         )  # fmt: skip
 
     monkeypatch.setattr(module, "solve_trial", trial)
@@ -99,7 +109,7 @@ def test_soft_grains_that_fit_clearly_better_are_used(inputs, corrected, monkeyp
     assert "rigid" in sequence.remark
 
 
-@pytest.mark.parametrize(("expected", "rise"), [(0.7, SHOWN - 0.01), (FITS_HARD + 0.001, 1.0)])
+@pytest.mark.parametrize(("expected", "rise"), [(0.7, SHOWN - 0.01), (FITS + 0.001, 1.0)])
 def test_hard_grains_stay_hard_where_that_is_no_clear_gain_or_they_fit(inputs, corrected, monkeypatch, expected, rise):
     corrected.hide(Sequence(softness_hidden=True))
     solved(monkeypatch, expected, {"soft": rise})
@@ -108,11 +118,38 @@ def test_hard_grains_stay_hard_where_that_is_no_clear_gain_or_they_fit(inputs, c
     assert corrected.inputs == [inputs]
 
 
+@pytest.mark.parametrize(
+    ("rise", "agreement", "overlaps", "used"),
+    [
+        (CONFIRMED + 0.01, 0.71, OVERLAPS_FIT, True),
+        (CONFIRMED - 0.01, 0.71, OVERLAPS_FIT, False),
+        (CONFIRMED + 0.01, 0.69, 1.0, False),
+        (LEAST + 0.01, 0.71, OVERLAPS_FIT + 0.01, True),
+        (LEAST - 0.01, 0.71, OVERLAPS_FIT + 0.01, False),
+    ],
+)
+def test_less_is_needed_of_soft_grains_that_agree_with_the_motion(
+    inputs, corrected, monkeypatch, rise, agreement, overlaps, used
+):
+    corrected.hide(Sequence(softness_hidden=True))
+    solved(monkeypatch, 0.7, {"soft": rise}, agreement=agreement, overlaps=overlaps)
+    found, sequence = correct_by_trial(inputs)
+    assert (found is not inputs) is used
+    assert ("agree with the motion by 0.71, not 0.70" in sequence.remark) is (used and rise < 0.0)
+
+
+def test_overlaps_behind_a_stretching_are_always_compared(inputs, corrected, monkeypatch):
+    corrected.hide(Sequence(softness_hidden=True, lens=stretching(-0.0025, -0.001)))
+    solved(monkeypatch, FITS + 0.01, {"soft": SHOWN + 0.01})
+    assert correct_by_trial(inputs)[0].material.stiffness == "estimate"
+
+
 def test_without_a_load_soft_grains_must_agree_with_the_motion_as_well_as_hard_ones(inputs, corrected, monkeypatch):
     corrected.hide(Sequence(softness_hidden=True))
-    solved(monkeypatch, 0.7, {"soft": SHOWN + 1.0}, loaded=False)
-    used, _ = correct_by_trial(inputs)
-    assert used is inputs
+    solved(monkeypatch, 0.7, {"soft": SHOWN + 1.0}, loaded=False, overlaps=1.0)
+    assert correct_by_trial(inputs)[0] is inputs
+    solved(monkeypatch, 0.7, {"soft": SHOWN + 0.01}, loaded=False, agreement=0.7)
+    assert correct_by_trial(inputs)[0] is not inputs
 
 
 def test_an_assumption_that_cannot_be_solved_is_not_used(inputs, corrected, monkeypatch):
@@ -124,7 +161,7 @@ def test_an_assumption_that_cannot_be_solved_is_not_used(inputs, corrected, monk
 
 def test_the_axis_along_which_lengths_fit_better_is_rescaled(inputs, corrected, monkeypatch):
     corrected.hide(Sequence(lens=stretching(-0.0025, -0.001)))
-    tried = solved(monkeypatch, FITS_STRETCHED - 0.001, {"x -0.5 %": 0.4, "y +0.5 %": 0.6})
+    tried = solved(monkeypatch, FITS - 0.001, {"x -0.5 %": 0.4, "y +0.5 %": 0.6})
     used, sequence = correct_by_trial(inputs)
     assert tried == ["as given", "no stretching", "x -0.5 %", "y +0.5 %"]
     np.testing.assert_allclose(used.stretching.factor, [1.0, 1.005])
@@ -134,6 +171,12 @@ def test_the_axis_along_which_lengths_fit_better_is_rescaled(inputs, corrected, 
     assert used.stretching.evidence.startswith("lengths along y are taken to be 0.5 % too short, since what the forces")
     assert used.stretching.evidence.endswith("then falls to 30 %")
     assert sequence.remark == f"noise is larger than stated; {used.stretching.evidence}"
+
+
+def test_a_stretching_that_fits_hardly_better_is_not_removed(inputs, corrected, monkeypatch):
+    corrected.hide(Sequence(lens=stretching(-0.0025, -0.001)))
+    solved(monkeypatch, 0.9, {"x -0.5 %": SHOWN - 0.01})
+    assert correct_by_trial(inputs)[0] is inputs
 
 
 def test_gaps_that_depend_on_the_direction_may_be_forces(inputs, corrected, monkeypatch):
@@ -148,7 +191,7 @@ def test_gaps_that_depend_on_the_direction_may_be_forces(inputs, corrected, monk
 @pytest.mark.parametrize(
     ("lens", "expected"),
     [
-        (stretching(-0.0025, -0.001), FITS_STRETCHED + 0.001),
+        (stretching(-0.0025, -0.001), FITS + 0.001),
         (stretching(0.0, 0.0), 0.5),
         (stretching(-0.0025, -0.001, applied=False), 0.5),
         (stretching(-0.0025, -0.001, 0.02), 0.5),  # a lens, too
