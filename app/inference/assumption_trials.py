@@ -20,9 +20,8 @@ from .correction.correct_sequence import correct_sequence
 from .diagnosis.trial import PREDICTED_PHOTOGRAPHS, Trial, remainder, select_window, solve_trial, try_rival
 from .inputs import Inputs, Stretching
 
-# Expected r from which on an assumption is not compared: forces that fit leave little to gain. With a stretching that
-# the gaps show removed, hard grains of seeds 82 and 91 have .958 to .993, soft ones .86 to .952; soft grains taken for
-# hard behind a stretching have .965 and .98 (seeds 62 and 66), and an r of .73 and .88: these are always compared.
+# Expected r from which on another stretching is not compared: with that of the gaps removed, hard grains of seeds 82
+# and 91 have .958 to .993, soft ones .86 to .952. Soft grains taken for hard may have .98, and an r of .82 (seed 70).
 FITS = 0.97
 # Least rise of arctanh r. Of 55 tests with parameters drawn at random (seeds 60 to 63, eighteen kinds with errors, 150
 # rods), five with soft grains raise it by .37 to 1.51, and r by .08 to .46; the other soft ones by at most .2, and hard
@@ -80,10 +79,10 @@ def correct_by_trial(inputs: Inputs, progress: Progress = no_progress) -> tuple[
         A requested friction coefficient or coordination number cannot be determined.
     """
     sequence = correct_sequence(inputs)
-    soft, along = list(_soft(inputs, sequence)), list(_along_one_axis(inputs, sequence))
-    others = [*soft, *along]
+    soft = list(_soft(inputs, sequence))
+    others = [*soft, *_along_one_axis(inputs, sequence)]
     trial = solve_trial(_with_seen_rods(inputs)) if others else None
-    if trial is None or not (trial.expected[0] < FITS or (soft and along)):
+    if trial is None or not (soft or trial.expected[0] < FITS):
         return inputs, sequence
     shown: list[tuple[Trial, _Assumption]] = []
     for done, each in enumerate(others, start=1):

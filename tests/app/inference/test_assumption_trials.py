@@ -109,10 +109,9 @@ def test_soft_grains_that_fit_clearly_better_are_used(inputs, corrected, monkeyp
     assert "rigid" in sequence.remark
 
 
-@pytest.mark.parametrize(("expected", "rise"), [(0.7, SHOWN - 0.01), (FITS + 0.001, 1.0)])
-def test_hard_grains_stay_hard_where_that_is_no_clear_gain_or_they_fit(inputs, corrected, monkeypatch, expected, rise):
+def test_hard_grains_stay_hard_where_that_is_no_clear_gain(inputs, corrected, monkeypatch):
     corrected.hide(Sequence(softness_hidden=True))
-    solved(monkeypatch, expected, {"soft": rise})
+    solved(monkeypatch, 0.7, {"soft": SHOWN - 0.01})
     used, _ = correct_by_trial(inputs)
     assert used is inputs
     assert corrected.inputs == [inputs]
@@ -138,8 +137,8 @@ def test_less_is_needed_of_soft_grains_that_agree_with_the_motion(
     assert ("agree with the motion by 0.71, not 0.70" in sequence.remark) is (used and rise < 0.0)
 
 
-def test_overlaps_behind_a_stretching_are_always_compared(inputs, corrected, monkeypatch):
-    corrected.hide(Sequence(softness_hidden=True, lens=stretching(-0.0025, -0.001)))
+def test_hidden_overlaps_are_compared_whatever_is_expected(inputs, corrected, monkeypatch):
+    corrected.hide(Sequence(softness_hidden=True))
     solved(monkeypatch, FITS + 0.01, {"soft": SHOWN + 0.01})
     assert correct_by_trial(inputs)[0].material.stiffness == "estimate"
 
