@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment, read_tracks
 from rodsight.inference.corrected_sequence import CorrectedSequence
+from rodsight.inference.correction import correct_sequence as correct_module
 from rodsight.inference.correction import errors_by_forces, soft_grain_errors
 from rodsight.inference.correction.soft_grain_errors import correct_grain_errors, correct_soft_grains
 from rodsight.solver.assessment.mixture_trust import MAX_TRUST_CORRECTED
@@ -42,6 +43,7 @@ def test_wrong_radii_are_corrected_by_forces(tmp_path, monkeypatch):
         return correct_grain_errors(tracks, *given)
 
     monkeypatch.setattr(soft_grain_errors, "correct_grain_errors", correct)
+    monkeypatch.setattr(correct_module, "use_size_classes", lambda tracks, *, soft: (tracks, ""))  # it removes them
     sequence, stated, true = corrected(tmp_path, "soft_radii_03", 9, 80)
     assert len(before) > 1
     for each in before:  # every pass finds the whole error, not what the former has left
