@@ -30,8 +30,8 @@ FITS = 0.97
 # in six of hard ones (seeds 60, 61, 82 to 91).
 SHOWN = 0.35
 # Agreement of the forces from overlaps with their motion-free balance, from which on no rise is needed if they agree
-# with the motion, too, and least rise then: .949 to .986 in five soft packings of seeds 60 to 65, at most .93 in 22 hard
-# ones that do so. Of seeds 66 to 69 one hard packing has .96 and a rise of −.54: taken for soft, its r falls by .15.
+# with the motion, too, and least rise then: .949 to .986 in five soft packings of seeds 60 to 65, at most .93 in 22
+# hard ones that do so. Of seeds 66 to 69 one hard packing has .96 and a rise of −.54: as a soft one, r falls by .15.
 # Of seeds 70 to 73 none of 24 hard ones passes both; the nearest has .95 and −.42.
 LEAST = -0.3
 OVERLAPS_FIT = 0.94
